@@ -1,0 +1,184 @@
+#!/usr/bin/env python3
+"""Set everything up and run it: needs Python 3.11 or newer with venv and pip, and nothing else.
+
+    python3 bootstrap.py demo               install, run the elbow, leave a recording and a plot in out/
+    python3 bootstrap.py test [ARGS]        install, run the tests with MuJoCo 3; ARGS go to pytest
+    python3 bootstrap.py test --mujoco 4    the same with MuJoCo 4, in an environment of its own
+
+Environments are kept beside this file (.venv, .venv-mujoco4) and used again as long as pyproject.toml stays as it is.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+OLDEST_PYTHON = (3, 11)
+STAMP = "mjwrap-bootstrap.json"
+
+DEMO_MODEL = "models/elbow/elbow.xml"
+DEMO_RECORDING = "out/elbow.rrd"
+DEMO_PLOT = "out/elbow.png"
+
+# The wheels of MuJoCo 3 and 4 share a folder but not their lists of files, so going from one to the other inside an
+# environment leaves a mixture of both. Each has its own. myo-sim, real models for tests and demo, needs mujoco<4.
+FOLDERS = {3: ".venv", 4: ".venv-mujoco4"}
+DEMO_EXTRAS = {"demo", "myo"}
+TEST_EXTRAS = {3: {"demo", "dev", "myo", "test"}, 4: {"demo", "test"}}
+PINS = {3: "mujoco<4", 4: "mujoco>=4"}
+
+
+class SetupError(Exception):
+    """Something that the user has to mend; the message says what and how. `code` becomes the exit code."""
+
+    def __init__(self, message: str, code: int = 1) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def say(text: str) -> None:
+    print(f"bootstrap: {text}", flush=True)
+
+
+def check_python() -> None:
+    """Raise `SetupError` unless this Python is new enough and can make virtual environments."""
+    if sys.version_info[:2] < OLDEST_PYTHON:
+        wanted, found = ".".join(map(str, OLDEST_PYTHON)), ".".join(map(str, sys.version_info[:2]))
+        raise SetupError(
+            f"mjwrap needs Python {wanted} or newer, this is {found} ({sys.executable}). "
+            f"Run it with another, for example: python{wanted} bootstrap.py demo"
+        )
+    try:
+        import ensurepip  # noqa: F401
+        import venv  # noqa: F401
+    except ImportError as error:
+        raise SetupError(
+            f"this Python cannot make virtual environments ({error}). "
+            "On Debian and Ubuntu: sudo apt install python3-venv"
+        ) from None
+
+
+def environment() -> dict:
+    """The environment of every command run here: the user's, less what would let other packages in."""
+    return {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONPATH")}
+
+
+def interpreter(folder: Path) -> Path:
+    return folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+
+
+def wanted_stamp(extras: "set[str]", mujoco: int) -> dict:
+    """What an environment was made from: it is used again while this stays the same."""
+    return {
+        "project": hashlib.sha256((ROOT / "pyproject.toml").read_bytes()).hexdigest(),
+        "python": ".".join(map(str, sys.version_info[:3])),
+        "mujoco": PINS[mujoco],
+        "extras": sorted(extras),
+    }
+
+
+def read_stamp(folder: Path) -> dict:
+    try:
+        return json.loads((folder / STAMP).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def is_ready(folder: Path, wanted: dict) -> bool:
+    """True where the environment in `folder` has everything that `wanted` names, from the same project file."""
+    found = read_stamp(folder)
+    same = all(found.get(key) == wanted[key] for key in ("project", "python", "mujoco"))
+    return same and set(wanted["extras"]) <= set(found.get("extras", [])) and interpreter(folder).exists()
+
+
+def prepare(extras: "set[str]", mujoco: int) -> Path:
+    """Make the environment for `mujoco` (3 or 4) with `extras` or find it ready; return its interpreter."""
+    folder = ROOT / FOLDERS[mujoco]
+    wanted = wanted_stamp(extras, mujoco)
+    python = interpreter(folder)
+    if is_ready(folder, wanted):
+        say(f"{folder.name} is up to date")
+        return python
+
+    started = time.monotonic()
+    found = read_stamp(folder)
+    if found.get("python") == wanted["python"] and found.get("mujoco") == wanted["mujoco"] and python.exists():
+        wanted["extras"] = sorted(extras | set(found["extras"]))
+        (folder / STAMP).unlink()
+    else:
+        say(f"making {folder.name} with Python {wanted['python']}")
+        make = subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], env=environment())
+        if make.returncode:
+            raise SetupError(f"the virtual environment {folder.name} could not be made (see above)", make.returncode)
+
+    say(f"installing mjwrap[{','.join(wanted['extras'])}] with {wanted['mujoco']} (takes minutes the first time)")
+    target = f"{ROOT}[{','.join(wanted['extras'])}]"
+    command = [str(python), "-m", "pip", "install", "-qq", "--disable-pip-version-check"]
+    install = subprocess.run([*command, "-e", target, wanted["mujoco"]], env=environment())
+    if install.returncode:
+        raise SetupError(
+            "pip could not install what mjwrap needs (its own words are above). Without a network connection the "
+            "first run cannot work; behind a proxy or mirror, pip reads HTTPS_PROXY and PIP_INDEX_URL",
+            install.returncode,
+        )
+    (folder / STAMP).write_text(json.dumps(wanted, indent=1), encoding="utf-8")
+    say(f"{folder.name} is ready after {time.monotonic() - started:.0f} s")
+    return python
+
+
+def run_demo() -> int:
+    """Simulate the elbow; say where the recording and the plot are."""
+    python = prepare(DEMO_EXTRAS, 3)
+    (ROOT / "out").mkdir(exist_ok=True)
+    arguments = [DEMO_MODEL, "--duration", "2", "--excitation", "pulses"]
+    outputs = ["--record", DEMO_RECORDING, "--plot", DEMO_PLOT]
+    say(f"running scripts/simulate.py {' '.join(arguments + outputs)}")
+    result = subprocess.run(
+        [str(python), "scripts/simulate.py", *arguments, *outputs], cwd=ROOT, env=environment()
+    )
+    if result.returncode:
+        return result.returncode
+    missing = [name for name in (DEMO_RECORDING, DEMO_PLOT) if not (ROOT / name).is_file()]
+    if missing:
+        raise SetupError(f"the run ended well but did not leave {' and '.join(missing)}")
+    say(f"recording: {ROOT / DEMO_RECORDING}")
+    say(f"plot:      {ROOT / DEMO_PLOT}")
+    say(f"look at the recording with: {python.relative_to(ROOT)} scripts/replay.py {DEMO_RECORDING}")
+    return 0
+
+
+def run_tests(mujoco: int, arguments: "list[str]") -> int:
+    """Run pytest with `arguments`; its exit code is returned."""
+    python = prepare(TEST_EXTRAS[mujoco], mujoco)
+    say(f"running pytest {' '.join(arguments)}".rstrip())
+    return subprocess.run([str(python), "-m", "pytest", *arguments], cwd=ROOT, env=environment()).returncode
+
+
+def main(argv: "list[str] | None" = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="bootstrap.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="{demo,test}")
+    commands.add_parser("demo", help="install, run the elbow, leave a recording and a plot")
+    test = commands.add_parser("test", help="install and run the tests; further arguments go to pytest")
+    test.add_argument("--mujoco", type=int, choices=sorted(FOLDERS), default=3, help="MuJoCo's major version")
+    options, rest = parser.parse_known_args(argv)
+    if rest and options.command != "test":
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    try:
+        check_python()
+        return run_demo() if options.command == "demo" else run_tests(options.mujoco, rest)
+    except SetupError as error:
+        print(f"bootstrap: error: {error}", file=sys.stderr)
+        return error.code
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())
