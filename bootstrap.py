@@ -107,16 +107,20 @@ def prepare(extras: "set[str]", mujoco: int) -> Path:
 
     started = time.monotonic()
     found = read_stamp(folder)
-    if found.get("python") == wanted["python"] and found.get("mujoco") == wanted["mujoco"] and python.exists():
+    if python.exists() and all(found.get(key) == wanted[key] for key in ("python", "mujoco")):
         wanted["extras"] = sorted(extras | set(found["extras"]))
         (folder / STAMP).unlink()
     else:
         say(f"making {folder.name} with Python {wanted['python']}")
         make = subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], env=environment())
         if make.returncode:
-            raise SetupError(f"the virtual environment {folder.name} could not be made (see above)", make.returncode)
+            raise SetupError(
+                f"the virtual environment {folder.name} could not be made (see above)", make.returncode
+            )
 
-    say(f"installing mjwrap[{','.join(wanted['extras'])}] with {wanted['mujoco']} (takes minutes the first time)")
+    say(
+        f"installing mjwrap[{','.join(wanted['extras'])}] with {wanted['mujoco']} (takes minutes the first time)"
+    )
     target = f"{ROOT}[{','.join(wanted['extras'])}]"
     command = [str(python), "-m", "pip", "install", "-qq", "--disable-pip-version-check"]
     install = subprocess.run([*command, "-e", target, wanted["mujoco"]], env=environment())
@@ -160,6 +164,18 @@ def run_tests(mujoco: int, arguments: "list[str]") -> int:
 
 
 def main(argv: "list[str] | None" = None) -> int:
+    try:
+        check_python()
+        return run(argv)
+    except SetupError as error:
+        print(f"bootstrap: error: {error}", file=sys.stderr)
+        return error.code
+    except KeyboardInterrupt:
+        return 130
+
+
+def run(argv: "list[str] | None") -> int:
+    """Read the command line and carry it out."""
     parser = argparse.ArgumentParser(
         prog="bootstrap.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -170,14 +186,7 @@ def main(argv: "list[str] | None" = None) -> int:
     options, rest = parser.parse_known_args(argv)
     if rest and options.command != "test":
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
-    try:
-        check_python()
-        return run_demo() if options.command == "demo" else run_tests(options.mujoco, rest)
-    except SetupError as error:
-        print(f"bootstrap: error: {error}", file=sys.stderr)
-        return error.code
-    except KeyboardInterrupt:
-        return 130
+    return run_demo() if options.command == "demo" else run_tests(options.mujoco, rest)
 
 
 if __name__ == "__main__":
