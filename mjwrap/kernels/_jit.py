@@ -1,0 +1,102 @@
+"""The one place that decides how kernels are compiled and where the machine code is kept.
+
+numba keys its disk cache on the file of each function alone, so an edit in a callee would go unnoticed. The
+cache therefore lives in a folder named by a hash over all kernel sources: any edit starts a new, empty cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core import event
+
+F = TypeVar("F", bound=Callable[..., Any])
+_HERE = Path(__file__).parent
+_NOTICE = "mjwrap: compiling its kernels, once for this machine and version (about 15 s) ..."
+
+
+def source_hash() -> str:
+    """Return 16 hexadecimal digits that change with any kernel source, numba's version or bounds checking."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]} {_boundscheck()}".encode())
+    for file in sorted(_HERE.glob("*.py")):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _boundscheck() -> str:
+    return os.environ.get("NUMBA_BOUNDSCHECK", "0")
+
+
+def _candidates() -> list[Path]:
+    """Return the folders in which the cache may live, best first."""
+    found = []
+    if numba.config.CACHE_DIR:  # NUMBA_CACHE_DIR
+        found.append(Path(numba.config.CACHE_DIR))
+    if os.environ.get("XDG_CACHE_HOME"):
+        found.append(Path(os.environ["XDG_CACHE_HOME"]))
+    elif os.name == "nt":
+        found.append(Path(os.environ.get("LOCALAPPDATA", tempfile.gettempdir())))
+    elif sys.platform == "darwin":
+        found.append(Path.home() / "Library" / "Caches")
+    else:
+        found.append(Path.home() / ".cache")
+    user = os.environ.get("USER", os.environ.get("USERNAME", "user"))
+    found.append(Path(tempfile.gettempdir()) / f"mjwrap-{user}")
+    return found
+
+
+def cache_dir() -> Path:
+    """Return the folder of the compiled kernels, created and writable."""
+    for base in _candidates():
+        folder = base / "mjwrap" / source_hash()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix="mjwrap-"))
+
+
+class _Announcer(event.Listener):
+    """Tells the user, once a process, that kernels are being compiled rather than loaded."""
+
+    def __init__(self) -> None:
+        self.silent = False
+
+    def on_start(self, event: Any) -> None:
+        dispatcher = event.data.get("dispatcher") if event.data else None
+        function = getattr(dispatcher, "py_func", None)
+        if not self.silent and getattr(function, "__module__", "").startswith("mjwrap."):
+            self.silent = True
+            print(_NOTICE, file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+_CACHE = str(cache_dir())
+event.register("numba:compile", _Announcer())
+
+
+def jit(function: F) -> F:
+    """Compile a kernel: no GIL, IEEE semantics but for fused multiply-adds, machine code kept on disk."""
+    return _compile(function, "never")
+
+
+def _compile(function: Any, inline: str) -> Any:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _CACHE  # read by numba when the function is decorated
+    try:
+        return numba.njit(
+            function, cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, inline=inline
+        )
+    finally:
+        numba.config.CACHE_DIR = before
