@@ -1,0 +1,164 @@
+"""The names that other people's scripts rely on exist, with these signatures, and importing them is cheap."""
+
+import ast
+import inspect
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import mjwrap as mw
+
+# Each signature as a script relies on it: parameters in order, "*" before those given by name, "=" after those that
+# have a default. A function may have further ones that nobody has to give.
+SIGNATURES = {
+    "Cylinder": "radius",
+    "Sphere": "radius",
+    "Obstacle": "surface, pos=, quat=, hint=",
+    "ViaPoint": "pos",
+    "solve_path": "origin, insertion, obstacles, *, method=, start=, tol=",
+    "solve_sweep": "origin, insertion, obstacles, pos, quat, *, warm=",
+    "MuscleSystem": "model, *, strict=",
+    "Recorder": "model, muscles, path",
+    "PathSolution.points": "self, spacing",
+    "PathSolution.speed": "self, origin_velocity, insertion_velocity, twists",
+    "PathSolution.wrenches": "self, tension",
+    "MuscleSystem.forward": "self, data",
+    "MuscleSystem.apply": "self, data",
+    "MuscleSystem.step": "self, data, nstep=",
+    "MuscleSystem.length_jacobian": "self, data",
+    "MuscleSystem.reset": "self, data",
+    "MuscleSystem.points": "self, i",
+    "Recorder.log": "self, data",
+    "Recorder.close": "self",
+}
+PACKAGE = Path(mw.__file__).parent
+ROOT = Path(__file__).resolve().parent.parent
+HEAVY = {"rerun", "matplotlib", "scipy", "tqdm"}
+ERRORS = ["GeometryError", "ModelError", "PathError", "RecordingError", "StateError"]
+
+
+def find(name: str) -> object:
+    found: object = mw
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def check_signature(function: object, written: str) -> None:
+    """Assert that a script that calls `function` as `written` says goes on working; further options are allowed."""
+    assert callable(function)
+    signature = inspect.signature(function)
+    parameters = list(signature.parameters.values())
+    positional = [p for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
+    rest_by_name = False
+    for place, word in enumerate(part.strip() for part in written.split(",")):
+        if word == "*":
+            rest_by_name = True
+            continue
+        name, has_default = word.removesuffix("="), word.endswith("=")
+        if rest_by_name:
+            assert name in signature.parameters, f"{name} is missing in {signature}"
+            assert signature.parameters[name].kind is inspect.Parameter.KEYWORD_ONLY, f"{name} in {signature}"
+        else:
+            assert place < len(positional), f"no place for {name} in {signature}"
+            assert positional[place].name == name, f"{name} is not number {place} in {signature}"
+        if has_default:
+            assert signature.parameters[name].default is not inspect.Parameter.empty, f"{name} in {signature}"
+    given = {word.strip() for word in written.split(",")}
+    needed = {
+        p.name for p in parameters if p.default is p.empty and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)
+    }
+    assert needed <= given, f"{signature} asks for more than {written}"
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_signatures(name: str) -> None:
+    check_signature(find(name), SIGNATURES[name])
+
+
+def test_every_public_name_is_listed_and_exists() -> None:
+    public = (
+        {name.split(".")[0] for name in SIGNATURES} | set(ERRORS) | {"MjwrapError", "Status", "PathSolution"}
+    )
+    assert public <= set(mw.__all__)
+    assert set(mw.__all__) <= set(dir(mw))
+    for name in mw.__all__:
+        assert getattr(mw, name) is not None
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="Cilinder"):
+        _ = mw.Cilinder  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_errors_have_one_root(name: str) -> None:
+    assert issubclass(getattr(mw, name), mw.MjwrapError)
+
+
+def test_public_names_have_docstrings() -> None:
+    names = [*SIGNATURES, *ERRORS, "MjwrapError", "Status", "PathSolution"]
+    assert [name for name in names if not inspect.getdoc(find(name))] == []
+
+
+def loaded_by(code: str) -> set[str]:
+    """Return the top-level packages that a fresh interpreter has loaded after `code`."""
+    program = f"{code}\nimport sys, json; print(json.dumps([m for m in sys.modules if '.' not in m]))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def test_importing_loads_nothing_that_is_not_needed() -> None:
+    assert loaded_by("import mjwrap") & (HEAVY | {"mujoco"}) == set()
+
+
+def test_a_path_needs_neither_mujoco_nor_scipy() -> None:
+    code = "import mjwrap as mw; mw.solve_path((.1, 0, 0), (-.1, 0, 0), [mw.Obstacle(mw.Sphere(.03), pos=(0, .01, 0))])"
+    assert loaded_by(code) & (HEAVY | {"mujoco"}) == set()
+
+
+def test_a_simulation_loads_nothing_that_is_not_needed() -> None:
+    code = """
+import mujoco, mjwrap as mw
+model = mujoco.MjModel.from_xml_path("models/elbow/elbow.xml")
+data = mujoco.MjData(model)
+mw.MuscleSystem(model).step(data)
+"""
+    assert loaded_by(code) & HEAVY == set()
+
+
+def test_import_time_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    """Wall time depends on the machine, so it is printed, not judged."""
+
+    def seconds(code: str) -> float:
+        started = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True)
+        return time.perf_counter() - started
+
+    mujoco = seconds("import mujoco")
+    both = seconds("import mujoco, mjwrap; mjwrap.MuscleSystem")
+    with capsys.disabled():
+        print(f"\nimport mujoco {mujoco:.2f} s; mjwrap on top of it {both - mujoco:.2f} s")
+
+
+def is_typed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    arguments = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
+    return function.returns is not None and all(a.annotation or a.arg in ("self", "cls") for a in arguments)
+
+
+def test_the_package_is_typed() -> None:
+    """Every function of the package says what it takes and returns, kernels excepted: numba reads those itself."""
+    bare = [
+        f"{file.name}:{node.lineno} {node.name}"
+        for file in sorted(PACKAGE.rglob("*.py"))
+        if "kernels" not in file.parts
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not is_typed(node)
+    ]
+    assert bare == []
