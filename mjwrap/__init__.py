@@ -1,3 +1,72 @@
 """Geodesic muscles for MuJoCo: C1 paths over any number of wrapping surfaces."""
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from mjwrap.errors import GeometryError, ModelError, MjwrapError, PathError, RecordingError, StateError
+
+if TYPE_CHECKING:
+    from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle, PathActuator
+    from mjwrap.paths import Contact, Obstacle, PathSolution, Status, SweepSolution, ViaPoint, solve_path, solve_sweep
+    from mjwrap.recording import Recorder
+    from mjwrap.surfaces import Cylinder, Sphere
+    from mjwrap.system import MuscleSystem
+
 __version__ = "0.1.0"
+
+_HOMES = {
+    "Cylinder": "surfaces",
+    "Sphere": "surfaces",
+    "Contact": "paths",
+    "Obstacle": "paths",
+    "PathSolution": "paths",
+    "Status": "paths",
+    "SweepSolution": "paths",
+    "ViaPoint": "paths",
+    "solve_path": "paths",
+    "solve_sweep": "paths",
+    "DeGrooteFregly2016": "muscles",
+    "MuJoCoMuscle": "muscles",
+    "PathActuator": "muscles",
+    "MuscleSystem": "system",
+    "Recorder": "recording",
+}
+
+__all__ = [
+    "Contact",
+    "Cylinder",
+    "DeGrooteFregly2016",
+    "GeometryError",
+    "MjwrapError",
+    "ModelError",
+    "MuJoCoMuscle",
+    "MuscleSystem",
+    "Obstacle",
+    "PathActuator",
+    "PathError",
+    "PathSolution",
+    "RecordingError",
+    "Recorder",
+    "Sphere",
+    "StateError",
+    "Status",
+    "SweepSolution",
+    "ViaPoint",
+    "solve_path",
+    "solve_sweep",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its module when it is first used, so that importing mjwrap costs next to nothing."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mjwrap' has no attribute {name!r}; it has: {', '.join(__all__)}")
+    value = getattr(importlib.import_module(f"mjwrap.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -9,6 +9,8 @@ import numpy as np
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geodesics import displace
+from mjwrap.kernels.newton import evaluate
+from mjwrap.kernels.relax import path_length
 from mjwrap.kernels.span import solve_span
 
 KIND, POS, ROT = lay.KIND, lay.POS, lay.ROT
@@ -70,6 +72,27 @@ def solve_chain(
 
 
 @jit
+def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
+    """Evaluate the path that the rows hold, without changing it; length and tangency error go to info[row]."""
+    total, square = 0.0, 0.0
+    ax, ay, az = 0.0, 0.0, 0.0
+    start = lo
+    for k in range(lo, hi + 1):
+        if k < hi and node[k, KIND] != lay.VIA:
+            continue
+        bx, by, bz = ix - ox, iy - oy, iz - oz
+        if k < hi:
+            bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
+        ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
+        square += evaluate(start, k, ends, node)
+        total += path_length(start, k, ends, node)
+        ax, ay, az = bx, by, bz
+        start = k + 1
+    info[row, I_LENGTH] = total
+    info[row, I_ERROR] = math.sqrt(square)
+
+
+@jit
 def set_rotation(node, k, w, x, y, z):
     """Write R_WS of the quaternion (w, x, y, z), normalised first, to row k."""
     scale = 2.0 / (w * w + x * x + y * y + z * z)
@@ -126,3 +149,7 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
         solve_chain(
             0, n, x, y, z, insertion[j, 0], insertion[j, 1], insertion[j, 2], node, tol, False, info, j
         )
+        if warm and info[j, I_STATUS] != lay.CONVERGED:
+            for k in range(n):  # go on from the last pose that was solved
+                for i in range(lay.STATE):
+                    node[k, S_MODE + i] = before[k, i]

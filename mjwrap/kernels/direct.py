@@ -195,3 +195,17 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz):
     if node[k, KIND] == lay.CYLINDER:
         return _wrap_cylinder(k, node[k, DIM], px, py, pz, qx, qy, qz, node)
     return _wrap_sphere(k, node[k, DIM], px, py, pz, qx, qy, qz, node)
+
+
+@jit
+def holds(k, node, x, y, z):
+    """Return whether the point (x, y, z) of the world lies inside obstacle k."""
+    x, y, z = x - node[k, POS], y - node[k, POS + 1], z - node[k, POS + 2]
+    px = node[k, ROT] * x + node[k, ROT + 3] * y + node[k, ROT + 6] * z
+    py = node[k, ROT + 1] * x + node[k, ROT + 4] * y + node[k, ROT + 7] * z
+    square = px * px + py * py
+    if node[k, KIND] == lay.SPHERE:
+        pz = node[k, ROT + 2] * x + node[k, ROT + 5] * y + node[k, ROT + 8] * z
+        square += pz * pz
+    limit = INSIDE * node[k, DIM]
+    return square < limit * limit

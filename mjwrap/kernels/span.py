@@ -13,7 +13,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import minimal, swept
-from mjwrap.kernels.direct import A_INSIDE, B_INSIDE, wrap
+from mjwrap.kernels.direct import A_INSIDE, B_INSIDE, holds, wrap
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.relax import path_length, relax, shorten
@@ -115,6 +115,17 @@ def _take_in(lo, hi, ends, node):
 
 
 @jit
+def _end_inside(lo, hi, ends, node):
+    """Return whether A or B lies inside an obstacle of the span."""
+    for k in range(lo, hi):
+        if holds(k, node, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5]):
+            return True
+        if holds(k, node, ends[0] + ends[6], ends[1] + ends[7], ends[2] + ends[8]):
+            return True
+    return False
+
+
+@jit
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
@@ -158,7 +169,9 @@ def solve_span(lo, hi, ends, node, tol, direct):
         repairs += 1
     if not settled and status != lay.NOT_MINIMAL:
         _, status = _take_in(lo, hi, ends, node)
-        if status == lay.CONVERGED:
+        if _end_inside(lo, hi, ends, node):
+            status = lay.ENDPOINT_INSIDE
+        elif status == lay.CONVERGED:
             status = lay.NOT_CONVERGED
     total = path_length(lo, hi, ends, node)
     return status, total, error, iterations, evaluations

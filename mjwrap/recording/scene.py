@@ -1,0 +1,124 @@
+"""Names and static contents of a recording: which entity stands for which body, geom, site and muscle."""
+
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from mjwrap.recording.columns import QUANTITIES
+from mjwrap.recording.geometry import geom_shape, pose
+from mjwrap.recording.stream import Stream
+
+SITE_COLORS = {"origins": (60, 200, 90), "insertions": (250, 160, 40), "via_points": (235, 235, 235)}
+CONTACT_COLOR = (250, 230, 60)
+# twelve hues that stay apart on black and on white
+SERIES_COLORS = np.array(
+    [
+        (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (148, 103, 189), (140, 86, 75),
+        (227, 119, 194), (150, 150, 150), (188, 189, 34), (23, 190, 207), (94, 79, 240), (0, 140, 110),
+    ],
+    dtype=np.uint8,
+)  # fmt: skip
+VISIBLE_GROUPS = 3  # MuJoCo's viewer shows geom groups 0 to 2; later ones hold collision shapes
+
+
+class Scene:
+    """Entity paths of everything in `model` that the recording shows."""
+
+    def __init__(self, model: Any, muscles: Any) -> None:
+        self.model = model
+        self.declarations = list(muscles.declarations)
+        self.muscle_names = _distinct([str(name) for name in muscles.names], "muscle")
+        self.paths = [entity("world", "muscles", name, "path") for name in self.muscle_names]
+        self.contacts = [entity("world", "muscles", name, "contacts") for name in self.muscle_names]
+        self.series = {q: [entity(q, name) for name in self.muscle_names] for q in QUANTITIES}
+        body_names = _distinct([model.body(i).name for i in range(model.nbody)], "body")
+        self.bodies = [entity("world", "bodies", name) for name in body_names]
+        geom_names = _distinct([model.geom(i).name for i in range(model.ngeom)], "geom")
+        self.geoms = [
+            f"{self.bodies[model.geom_bodyid[i]]}/{entity('geoms', name)}" for i, name in enumerate(geom_names)
+        ]
+        self.wrapping = {int(geom) for muscle in self.declarations for geom in muscle.geoms}
+        self.hidden = [
+            self.geoms[i]
+            for i in range(model.ngeom)
+            if model.geom_group[i] >= VISIBLE_GROUPS and i not in self.wrapping
+        ]
+        sites = {int(site) for muscle in self.declarations for site in _route_sites(muscle)}
+        shown = {int(body) for body in model.geom_bodyid} | {int(model.site_bodyid[site]) for site in sites}
+        self.shown = sorted(shown - {0})
+        self.moving = [body for body in self.shown if _moves(model, body)]
+
+    def log_static(self, stream: Stream) -> None:
+        """Log geoms, muscle sites and the looks of lines, points and curves."""
+        stream.static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        model = self.model
+        for geom, path in enumerate(self.geoms):
+            shape = geom_shape(model, geom, wraps=geom in self.wrapping)
+            if shape is not None:
+                stream.static(path, shape, pose(model.geom_pos[geom], model.geom_quat[geom]))
+        for path, points in self._site_points().items():
+            stream.static(path, points)
+        for path, contact in zip(self.paths, self.contacts, strict=True):
+            stream.static(path, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(2.0)))
+            stream.static(
+                contact,
+                rr.Points3D.from_fields(colors=[CONTACT_COLOR], radii=rr.Radius.ui_points(3.0)),
+            )
+        for i, name in enumerate(self.muscle_names):
+            line = rr.SeriesLines(colors=[SERIES_COLORS[i % len(SERIES_COLORS)]], names=[name], widths=[1.5])
+            for quantity in QUANTITIES:
+                stream.static(self.series[quantity][i], line)
+
+    def log_welded(self, stream: Stream, positions: np.ndarray, quaternions: np.ndarray) -> None:
+        """Log the poses (nbody, 3), (nbody, 4) w-x-y-z of bodies that are fixed in the world."""
+        for body in set(self.shown) - set(self.moving):
+            stream.static(self.bodies[body], pose(positions[body], quaternions[body]))
+
+    def _site_points(self) -> dict[str, rr.Points3D]:
+        """Origins, insertions and via points, fixed in their bodies, labelled with the muscles they belong to."""
+        where: defaultdict[tuple[str, int], defaultdict[int, list[str]]] = defaultdict(lambda: defaultdict(list))
+        for muscle, name in zip(self.declarations, self.muscle_names, strict=True):
+            ends = [("origins", muscle.origin_site), ("insertions", muscle.insertion_site)]
+            for kind, site in ends + [("via_points", site) for site in muscle.via_sites]:
+                where[kind, int(self.model.site_bodyid[site])][int(site)].append(name)
+        points = {}
+        for (kind, body), sites in where.items():
+            points[f"{self.bodies[body]}/{kind}"] = rr.Points3D(
+                positions=self.model.site_pos[list(sites)],
+                labels=[", ".join(names) for names in sites.values()],
+                show_labels=False,
+                colors=[SITE_COLORS[kind]],
+                radii=rr.Radius.ui_points(4.0 if kind != "via_points" else 2.5),
+            )
+        return points
+
+
+def entity(*parts: str) -> str:
+    """An entity path of `parts`, each with its special characters escaped."""
+    return rr.new_entity_path(list(parts)).lstrip("/")
+
+
+def model_name(model: Any) -> str:
+    """The name in the `<mujoco model="...">` element."""
+    return model.names.split(b"\0", 1)[0].decode()
+
+
+def _moves(model: Any, body: int) -> bool:
+    """Whether anything can move a body: a joint above it, or a mocap pose."""
+    return model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0
+
+
+def _route_sites(muscle: Any) -> list[int]:
+    return [muscle.origin_site, *muscle.via_sites, muscle.insertion_site]
+
+
+def _distinct(names: list[str], kind: str) -> list[str]:
+    """Give every element a name of its own: nameless ones get their number, repeated ones too."""
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        if not name or name in taken:
+            names[i] = f"{name or kind}#{i}"
+        taken.add(names[i])
+    return names
