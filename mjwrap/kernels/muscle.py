@@ -138,6 +138,7 @@ def dgf_rigid(params, m, activation, length, speed):
     cosine = along / fibre
     v = speed * cosine / (params[m, 4] * optimal)
     x = fibre / optimal
+    activation = min(max(activation, 0.0), 1.0)
     normalised = activation * dgf_active(x) * dgf_velocity(v) + dgf_passive(x) + params[m, 5] * v
     return max(params[m, 0] * normalised * cosine, 0.0)
 

@@ -35,7 +35,9 @@ class Buffers:
         self._positions = np.empty((rows, bodies, 3), dtype=np.float32)
         self._quaternions = np.empty((rows, bodies, 4), dtype=np.float32)
         self._paths, self._contacts = columns.Ragged(), columns.Ragged()
-        self._scalar_table = columns.scalar_table([path for q in columns.QUANTITIES for path in scene.series[q]])
+        self._scalar_table = columns.scalar_table(
+            [path for q in columns.QUANTITIES for path in scene.series[q]]
+        )
         self._pose_table = columns.pose_table([scene.bodies[body] for body in scene.moving])
         self._path_table = columns.path_table(scene.paths, scene.contacts)
         self._rows = self._frames = 0

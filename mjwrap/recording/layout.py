@@ -51,7 +51,7 @@ def _page(scene: Scene, first: int) -> rrb.Vertical:
         for quantity, title in TITLES.items()
     ]
     title = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
-    return rrb.Vertical(contents=views, name=title)
+    return rrb.Vertical(contents=views, row_shares=[1.3, 1, 1, 1], name=title)  # room for the legend
 
 
 def _eye(points: np.ndarray, bodies: np.ndarray) -> rrb.EyeControls3D | None:
@@ -69,5 +69,5 @@ def _eye(points: np.ndarray, bodies: np.ndarray) -> rrb.EyeControls3D | None:
     level /= np.linalg.norm(level)
     if (bodies.mean(axis=0) - target) @ level > 0:
         level = -level
-    eye = target + 1.5 * size * (level + [0.0, 0.0, 0.35])
+    eye = target + 1.5 * size * (level + np.array([0.0, 0.0, 0.35]))
     return rrb.EyeControls3D(position=eye, look_target=target, eye_up=[0.0, 0.0, 1.0])

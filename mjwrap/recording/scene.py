@@ -12,14 +12,15 @@ from mjwrap.recording.stream import Stream
 
 SITE_COLORS = {"origins": (60, 200, 90), "insertions": (250, 160, 40), "via_points": (235, 235, 235)}
 CONTACT_COLOR = (250, 230, 60)
-# twelve hues that stay apart on black and on white
+# eight hues that stay apart on black and on white
 SERIES_COLORS = np.array(
     [
-        (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40), (148, 103, 189), (140, 86, 75),
-        (227, 119, 194), (150, 150, 150), (188, 189, 34), (23, 190, 207), (94, 79, 240), (0, 140, 110),
+        (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40),
+        (148, 103, 189), (188, 189, 34), (23, 190, 207), (227, 119, 194),
     ],
     dtype=np.uint8,
 )  # fmt: skip
+CROWDED = 40  # muscles from which lines and points are drawn thinner
 VISIBLE_GROUPS = 3  # MuJoCo's viewer shows geom groups 0 to 2; later ones hold collision shapes
 
 
@@ -37,7 +38,8 @@ class Scene:
         self.bodies = [entity("world", "bodies", name) for name in body_names]
         geom_names = _distinct([model.geom(i).name for i in range(model.ngeom)], "geom")
         self.geoms = [
-            f"{self.bodies[model.geom_bodyid[i]]}/{entity('geoms', name)}" for i, name in enumerate(geom_names)
+            f"{self.bodies[model.geom_bodyid[i]]}/{entity('geoms', name)}"
+            for i, name in enumerate(geom_names)
         ]
         self.wrapping = {int(geom) for muscle in self.declarations for geom in muscle.geoms}
         self.hidden = [
@@ -60,25 +62,30 @@ class Scene:
                 stream.static(path, shape, pose(model.geom_pos[geom], model.geom_quat[geom]))
         for path, points in self._site_points().items():
             stream.static(path, points)
+        line = rr.LineStrips3D.from_fields(radii=self._radius(2.0))
+        dots = rr.Points3D.from_fields(colors=[CONTACT_COLOR], radii=self._radius(3.0))
         for path, contact in zip(self.paths, self.contacts, strict=True):
-            stream.static(path, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(2.0)))
-            stream.static(
-                contact,
-                rr.Points3D.from_fields(colors=[CONTACT_COLOR], radii=rr.Radius.ui_points(3.0)),
-            )
+            stream.static(path, line)
+            stream.static(contact, dots)
         for i, name in enumerate(self.muscle_names):
-            line = rr.SeriesLines(colors=[SERIES_COLORS[i % len(SERIES_COLORS)]], names=[name], widths=[1.5])
+            curve = rr.SeriesLines(colors=[SERIES_COLORS[i % len(SERIES_COLORS)]], names=[name], widths=[1.5])
             for quantity in QUANTITIES:
-                stream.static(self.series[quantity][i], line)
+                stream.static(self.series[quantity][i], curve)
 
     def log_welded(self, stream: Stream, positions: np.ndarray, quaternions: np.ndarray) -> None:
         """Log the poses (nbody, 3), (nbody, 4) w-x-y-z of bodies that are fixed in the world."""
         for body in set(self.shown) - set(self.moving):
             stream.static(self.bodies[body], pose(positions[body], quaternions[body]))
 
+    def _radius(self, points: float) -> Any:
+        """A radius on the screen [points], halved where there are many muscles."""
+        return rr.Radius.ui_points(points if len(self.muscle_names) < CROWDED else 0.5 * points)
+
     def _site_points(self) -> dict[str, rr.Points3D]:
         """Origins, insertions and via points, fixed in their bodies, labelled with the muscles they belong to."""
-        where: defaultdict[tuple[str, int], defaultdict[int, list[str]]] = defaultdict(lambda: defaultdict(list))
+        where: defaultdict[tuple[str, int], defaultdict[int, list[str]]] = defaultdict(
+            lambda: defaultdict(list)
+        )
         for muscle, name in zip(self.declarations, self.muscle_names, strict=True):
             ends = [("origins", muscle.origin_site), ("insertions", muscle.insertion_site)]
             for kind, site in ends + [("via_points", site) for site in muscle.via_sites]:
@@ -90,7 +97,7 @@ class Scene:
                 labels=[", ".join(names) for names in sites.values()],
                 show_labels=False,
                 colors=[SITE_COLORS[kind]],
-                radii=rr.Radius.ui_points(4.0 if kind != "via_points" else 2.5),
+                radii=self._radius(2.5 if kind == "via_points" else 4.0),
             )
         return points
 

@@ -1,5 +1,6 @@
 """rerun's file writer, with errors that are raised: it reports a failed write late, or only in its own log."""
 
+import warnings
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -36,9 +37,9 @@ class Stream:
         """Log what holds for the whole recording."""
         self._recording.log(entity, *archetypes, static=True, strict=True)
 
-    def properties(self, **values: object) -> None:
+    def properties(self, **values: str | float | list[str]) -> None:
         """Log properties of the recording as a whole."""
-        rr.send_property(APPLICATION, rr.AnyValues(**values), recording=self._recording)
+        rr.send_property(APPLICATION, rr.AnyValues(True, **values), recording=self._recording)
 
     def blueprint(self, blueprint: "rrb.Blueprint") -> None:
         """Send the layout that the viewer opens with."""
@@ -66,7 +67,9 @@ class Stream:
         self.wait()
         self._recording.disconnect()
         try:
-            RrdReader(self._target.part).store()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # rerun warns of a missing footer, and store() raises for it
+                RrdReader(self._target.part).store()
         except (RuntimeError, ValueError, OSError) as error:
             raise self._failed() from error
 
@@ -76,4 +79,6 @@ class Stream:
 
     def _failed(self) -> RecordingError:
         target = self._target
-        return RecordingError(f"recording to '{target.path}' failed: {target.write_fault()}; nothing was kept")
+        return RecordingError(
+            f"recording to '{target.path}' failed: {target.write_fault()}; nothing was kept"
+        )

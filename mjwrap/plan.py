@@ -1,0 +1,97 @@
+"""The flat arrays that the kernels read for all muscles of a model, built once from its declarations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.kernels import coupling, layout, muscle, readiness
+from mjwrap.mjcf import SURFACES, MuscleDeclaration
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Muscles, routes and nodes as the kernels in `mjwrap/kernels/coupling.py` read them."""
+
+    n: int
+    node: Array  # (N, ROW), cold
+    links: Ints  # (N, 4)
+    routes: Ints  # (C, 7)
+    weights: Array  # (C,)
+    law: Ints  # (n,)
+    params: Array  # (n, PARAMS)
+    source: Ints  # (n,) where the activation comes from
+    source_index: Ints  # (n,) index in act or ctrl
+    ctrl_low: Array  # (n,)
+    ctrl_high: Array  # (n,)
+    times: Array  # (n, 2) activation and deactivation time constants [s]
+
+    @property
+    def has_own(self) -> bool:
+        """Whether mjwrap integrates an activation itself."""
+        return bool((self.source == readiness.OWN).any())
+
+
+def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, float, float]:
+    """Return where a muscle's activation comes from: source, index, lower and upper limit."""
+    if declared.actuator < 0:
+        direct = declared.parameters.code == muscle.PATH_ACTUATOR
+        return (readiness.DIRECT if direct else readiness.OWN), 0, -np.inf, np.inf
+    actuator = declared.actuator
+    if int(model.actuator_actnum[actuator]) == 1:
+        return readiness.FROM_ACT, int(model.actuator_actadr[actuator]), -np.inf, np.inf
+    if model.actuator_ctrllimited[actuator]:
+        low, high = (float(x) for x in model.actuator_ctrlrange[actuator])
+        return readiness.FROM_CTRL, actuator, low, high
+    return readiness.FROM_CTRL, actuator, -np.inf, np.inf
+
+
+def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
+    """Return the kernels' arrays for a list of muscles."""
+    links: list[tuple[int, int, int, int]] = []
+    rows: list[Array] = []
+    routes: list[tuple[int, ...]] = []
+    weights: list[float] = []
+    for m, declared in enumerate(muscles):
+        for route in declared.routes:
+            first = len(links)
+            for node in route.nodes:
+                row = np.zeros(layout.ROW)
+                row[layout.S_MODE] = layout.COLD
+                if node.geom >= 0:
+                    row[layout.KIND] = SURFACES[int(model.geom_type[node.geom])]
+                    row[layout.DIM] = model.geom_size[node.geom, 0]
+                    body = int(model.geom_bodyid[node.geom])
+                else:
+                    body = int(model.site_bodyid[node.site])
+                rows.append(row)
+                links.append((node.site, node.geom, node.hint_site, body))
+            bodies = int(model.site_bodyid[route.origin]), int(model.site_bodyid[route.insertion])
+            routes.append((first, len(links), route.origin, route.insertion, *bodies, m))
+            weights.append(route.weight)
+    n = len(muscles)
+    params = np.zeros((n, muscle.PARAMS))
+    sources = [_source(model, declared) for declared in muscles]
+    for m, declared in enumerate(muscles):
+        values = declared.parameters.row()
+        params[m, : len(values)] = values
+    return Plan(
+        n=n,
+        node=np.array(rows).reshape(-1, layout.ROW),
+        links=np.array(links, dtype=np.int64).reshape(-1, 4),
+        routes=np.array(routes, dtype=np.int64).reshape(-1, coupling.ROUTE),
+        weights=np.array(weights, dtype=np.float64),
+        law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
+        params=params,
+        source=np.array([s[0] for s in sources], dtype=np.int64),
+        source_index=np.array([s[1] for s in sources], dtype=np.int64),
+        ctrl_low=np.array([s[2] for s in sources], dtype=np.float64),
+        ctrl_high=np.array([s[3] for s in sources], dtype=np.float64),
+        times=np.array([declared.activation_times for declared in muscles], dtype=np.float64).reshape(-1, 2),
+    )

@@ -1,0 +1,429 @@
+"""MuscleSystem: the only reader and writer of mjData.
+
+Forces belong to the state at which they act, at every stage of the integrator. So `step` evaluates the muscles between
+MuJoCo's position and acceleration stages, and under RK4 in a control callback that lives only as long as the step.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import GeometryError, PathError, StateError
+from mjwrap.kernels import coupling, layout, polyline, readiness, segments
+from mjwrap.mjcf import MuscleDeclaration, name_of, read_declarations
+from mjwrap.paths import Status
+from mjwrap.plan import Plan, build_plan
+from mjwrap.takeover import Takeover
+
+Array = NDArray[np.float64]
+TOLERANCE = 1e-10  # largest tangency error of a path
+
+
+class _State:
+    """What belongs to one mjData: warm starts, results, and what was added to its xfrc_applied."""
+
+    def __init__(self, model: mujoco.MjModel, plan: Plan) -> None:
+        n, routes = plan.n, len(plan.routes)
+        self.node = plan.node.copy()
+        self.segments = np.zeros((len(plan.node) + routes, segments.SEGMENT))
+        self.count = np.zeros(routes, dtype=np.int64)
+        self.info = np.zeros((routes, layout.INFO))
+        self.length, self.velocity, self.tension, self.activation = (np.zeros(n) for _ in range(4))
+        self.status = np.zeros(n, dtype=np.int64)
+        self.failures = np.zeros(n, dtype=np.int64)
+        self.last_failure = np.zeros(n, dtype=np.int64)
+        self.own, self.own_now = np.zeros(n), np.zeros(n)
+        self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
+        self.written = np.zeros(model.nbody, dtype=np.bool_)
+        self.scratch = mujoco.MjData(model)
+
+    def forget(self) -> None:
+        """Start cold: no branch, no last force, no failures."""
+        self.node[:, layout.S_MODE] = layout.COLD
+        self.count[:] = 0
+        for array in (self.length, self.velocity, self.tension, self.activation, self.own, self.own_now):
+            array[:] = 0.0
+        self.status[:] = 0
+        self.failures[:] = 0
+
+
+class MuscleSystem:
+    """Every muscle that a model declares, driven along geodesic paths.
+
+    model: an `MjModel`; its muscle actuators that mjwrap takes over keep their activation dynamics but pull no more
+    (`actuator_forcerange` is set to zero until `release`). strict: raise `PathError` where a path cannot be found,
+    instead of holding the muscle's last good force for that step. Raises `ModelError` for declarations that cannot be
+    understood. Results (`length`, `velocity`, `tension`, `activation`, `status`, each (n,)) are those of the last
+    `forward`, `apply` or `step`, at the state at which its forces acted. SI units; lengthening and tension positive.
+    """
+
+    def __init__(self, model: mujoco.MjModel, *, strict: bool = False) -> None:
+        self.model = model
+        self.strict = strict
+        self._takeover = Takeover(model)
+        with self._takeover.suspended():
+            found = read_declarations(model)
+        self.declarations: list[MuscleDeclaration] = found.muscles
+        self.native: dict[str, str] = found.native
+        self._plan = build_plan(model, found.muscles)
+        self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
+        self._states: dict[int, _State] = {}
+        self._last = _State(model, self._plan)
+        self.excitation: Array = np.zeros(self._plan.n)
+        self._root = np.asarray(model.body_rootid, dtype=np.int64)
+        self._parent = np.asarray(model.body_parentid, dtype=np.int64)
+        self._dofs = tuple(
+            np.asarray(a, dtype=np.int64) for a in (model.body_dofadr, model.body_dofnum, model.dof_parentid)
+        )
+
+    # ------------------------------------------------------------------------------------- results
+
+    @property
+    def n(self) -> int:
+        """Number of muscles."""
+        return self._plan.n
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the muscles, in the order of all arrays."""
+        return [muscle.name for muscle in self.declarations]
+
+    @property
+    def length(self) -> Array:
+        """Musculotendon lengths (n,) [m]."""
+        return self._last.length
+
+    @property
+    def velocity(self) -> Array:
+        """Lengthening speeds (n,) [m/s]."""
+        return self._last.velocity
+
+    @property
+    def tension(self) -> Array:
+        """Tensions (n,) [N], never negative."""
+        return self._last.tension
+
+    @property
+    def activation(self) -> Array:
+        """Activations (n,) [-]."""
+        return self._last.activation
+
+    @property
+    def status(self) -> NDArray[np.int64]:
+        """Codes of `mjwrap.Status` (n,)."""
+        return self._last.status
+
+    @property
+    def failures(self) -> NDArray[np.int64]:
+        """Number of steps (n,) at which a muscle's path was not found and its last good force was held."""
+        return self._last.failures
+
+    def index(self, name: str) -> int:
+        """Return the index of a muscle by name; `GeometryError` lists the names where there is no such muscle."""
+        if name not in self.names:
+            raise GeometryError(f"no muscle '{name}'; muscles: {', '.join(self.names) or 'none'}")
+        return self.names.index(name)
+
+    def report(self) -> str:
+        """Return one line per muscle whose path was not found on some steps, with the reason; empty if none."""
+        lines = []
+        for i, count in enumerate(self.failures):
+            if count:
+                reason = Status(int(self._last.last_failure[i])).message
+                lines.append(f"{self.names[i]}: {count} step{'s' * (count != 1)} without a path; at last {reason}")
+        return "\n".join(lines)
+
+    # ----------------------------------------------------------------------------------- evaluation
+
+    def _state(self, data: mujoco.MjData) -> _State:
+        if not isinstance(data, mujoco.MjData):
+            raise StateError(f"expected an MjData, not {type(data).__name__}")
+        if data.model._address != self.model._address:
+            raise StateError("this MjData belongs to another model than this MuscleSystem")
+        key = id(data)
+        if key not in self._states:
+            self._states[key] = _State(self.model, self._plan)
+            weakref.finalize(data, self._states.pop, key, None)
+        return self._states[key]
+
+    def _check(self, data: mujoco.MjData) -> None:
+        """Raise `StateError` naming what is not finite."""
+        for what, values in (("qpos", data.qpos), ("qvel", data.qvel), ("act", data.act), ("ctrl", data.ctrl)):
+            bad = readiness.first_bad(values)
+            if bad >= 0:
+                raise StateError(f"{what}[{bad}]{self._owner(what, bad)} is not finite at time {data.time:g} s")
+        bad = readiness.first_bad(self.excitation)
+        if bad >= 0:
+            raise StateError(f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s")
+
+    def _owner(self, what: str, index: int) -> str:
+        model = self.model
+        kinds = mujoco.mjtObj
+        if what == "qpos":
+            joint = int(np.searchsorted(model.jnt_qposadr, index, side="right")) - 1
+            return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, joint)}')"
+        if what == "qvel":
+            return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, int(model.dof_jntid[index]))}')"
+        if what == "ctrl":
+            return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, index)}')"
+        return ""
+
+    def _evaluate(self, state: _State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
+        """Paths, activations and tensions from the poses and velocities of `poses`; wrenches into state.wrench."""
+        plan = self._plan
+        coupling.solve_routes(
+            plan.routes, plan.links, poses.site_xpos, poses.geom_xpos, poses.geom_xmat, TOLERANCE,
+            state.node, state.segments, state.count, state.info,
+        )  # fmt: skip
+        readiness.gather_activation(
+            plan.source, plan.source_index, plan.ctrl_low, plan.ctrl_high,
+            data.act, data.ctrl, state.own_now, self.excitation, state.activation,
+        )  # fmt: skip
+        coupling.drive_muscles(
+            plan.routes, plan.weights, plan.links, state.segments, state.count, state.info,
+            poses.cvel, poses.subtree_com, self._root, plan.law, plan.params, state.activation,
+            state.length, state.velocity, state.tension, state.status,
+        )  # fmt: skip
+        coupling.body_wrenches(
+            plan.routes, plan.weights, plan.links, state.segments, state.count, state.tension, poses.xipos, state.wrench
+        )
+        self._last = state
+        if state.status.any():
+            self._failed(state, data)
+
+    def _failed(self, state: _State, data: mujoco.MjData) -> None:
+        """Note which muscles have no path; raise where the user asked for that."""
+        bad = np.flatnonzero(state.status)
+        state.last_failure[bad] = state.status[bad]
+        first = int(bad[0])
+        if (state.status == Status.NON_FINITE).any():
+            first = int(np.flatnonzero(state.status == Status.NON_FINITE)[0])
+            raise StateError(f"muscle '{self.names[first]}': a pose or force is not finite at time {data.time:g} s")
+        if self.strict:
+            reason = Status(int(state.status[first])).message
+            raise PathError(f"muscle '{self.names[first]}' at time {data.time:g} s: {reason}")
+
+    def _refresh(self, state: _State, data: mujoco.MjData) -> mujoco.MjData:
+        """Return scratch data with the kinematics of the present qpos and qvel; `data` may lag by a step."""
+        self._check(data)
+        model, scratch = self.model, state.scratch
+        scratch.qpos[:] = data.qpos
+        scratch.qvel[:] = data.qvel
+        scratch.mocap_pos[:] = data.mocap_pos
+        scratch.mocap_quat[:] = data.mocap_quat
+        mujoco.mj_kinematics(model, scratch)
+        mujoco.mj_comPos(model, scratch)
+        mujoco.mj_comVel(model, scratch)
+        return scratch
+
+    def forward(self, data: mujoco.MjData) -> None:
+        """Compute paths, lengths, velocities and tensions of the present qpos, qvel, act and ctrl.
+
+        Writes nothing to `data`, and needs no derived quantity of it to be up to date.
+        """
+        state = self._state(data)
+        state.own_now[:] = state.own
+        self._evaluate(state, self._refresh(state, data), data)
+
+    def apply(self, data: mujoco.MjData) -> None:
+        """Do `forward`, then put the wrenches into `data.xfrc_applied`, beside what others have there.
+
+        The last call's contribution is taken back first. Right for one following `mj_step` with an Euler or implicit
+        integrator; under RK4 use `step`, which evaluates at every stage.
+        """
+        self.forward(data)
+        state = self._last
+        state.failures += state.status != 0
+        coupling.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
+
+    def length_jacobian(self, data: mujoco.MjData) -> Array:
+        """Return ∂l/∂q (n, nv), the sign of MuJoCo's ten_J, at the present qpos; does a `forward` first."""
+        self.forward(data)
+        state, plan = self._last, self._plan
+        jacobian = np.zeros((plan.n, self.model.nv))
+        coupling.length_jacobian(
+            plan.routes, plan.weights, plan.links, state.segments, state.count, self._dofs,
+            self._parent, self._root, state.scratch.cdof, state.scratch.subtree_com, jacobian,
+        )  # fmt: skip
+        return jacobian
+
+    # -------------------------------------------------------------------------------------- stepping
+
+    def step(self, data: mujoco.MjData, nstep: int = 1) -> None:
+        """Advance the simulation by `nstep` time steps with the muscles' forces at every stage of the integrator.
+
+        Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds other people's contributions only.
+        Raises `StateError` for a state that is not finite.
+        """
+        state = self._state(data)
+        runge_kutta = int(self.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
+        silent = bool(int(self.model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION))
+        try:
+            if runge_kutta:
+                self._step_stages(state, data, nstep)
+            else:
+                for _ in range(nstep):
+                    self._check(data)
+                    mujoco.mj_step1(self.model, data)
+                    if not silent:
+                        self._act(state, data)
+                        state.failures += state.status != 0
+                    mujoco.mj_step2(self.model, data)
+                    self._advance_own(state, self.model.opt.timestep)
+        finally:
+            self._take_back(state, data)
+
+    def _act(self, state: _State, data: mujoco.MjData) -> None:
+        """Evaluate at the present stage of `data`, whose kinematics are fresh, and put the wrenches in."""
+        self._evaluate(state, data, data)
+        coupling.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
+
+    def _advance_own(self, state: _State, duration: float) -> None:
+        plan = self._plan
+        if plan.has_own:
+            readiness.advance_own(plan.source, self.excitation, plan.times, duration, state.own, state.own_now)
+            state.own[:] = state.own_now
+
+    def _take_back(self, state: _State, data: mujoco.MjData) -> None:
+        coupling.take_back(data.xfrc_applied, state.others, state.mine, state.total, state.written)
+
+    def _step_stages(self, state: _State, data: mujoco.MjData, nstep: int) -> None:
+        """Runge-Kutta: act in MuJoCo's control callback, which it calls at every stage."""
+        plan = self._plan
+        address, start = data._address, data.time
+        failed = np.zeros(plan.n, dtype=np.bool_)
+        caught: list[Exception] = []
+
+        def act(stage: mujoco.MjData) -> None:
+            if stage._address != address or caught:
+                return
+            try:
+                if plan.has_own:
+                    since = max(data.time - start, 0.0)
+                    readiness.advance_own(plan.source, self.excitation, plan.times, since, state.own, state.own_now)
+                self._act(state, data)
+                np.logical_or(failed, state.status != 0, out=failed)
+            except Exception as error:  # an exception must not cross MuJoCo's C frames; it is raised below
+                caught.append(error)
+
+        with _control_callback(act):
+            for _ in range(nstep):
+                self._check(data)
+                start = data.time
+                failed[:] = False
+                mujoco.mj_step(self.model, data)
+                if caught:
+                    raise caught[0]
+                state.failures += failed
+                self._advance_own(state, self.model.opt.timestep)
+
+    def reset(self, data: mujoco.MjData | None = None) -> None:
+        """Forget branches, warm starts and last forces, after `mj_resetData` or a jump of qpos.
+
+        What mjwrap had put into `data.xfrc_applied` and is still there is taken out. None resets all known data.
+        """
+        if data is None:
+            for state in self._states.values():
+                state.forget()
+                state.written[:] = False
+        else:
+            state = self._state(data)
+            self._take_back(state, data)
+            state.forget()
+        self._last.forget()
+
+    def release(self) -> None:
+        """Give the native actuators their forces back, as they were before the model was taken over."""
+        self._takeover.release()
+
+    # -------------------------------------------------------------------------------------- geometry
+
+    def _routes_of(self, i: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
+        if not 0 <= i < self.n:
+            raise GeometryError(f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names)}")
+        for c in np.flatnonzero(self._plan.routes[:, coupling.R_MUSCLE] == i):
+            yield int(c), self._plan.routes[c]
+
+    def _ends(self, c: int) -> tuple[Array, Array]:
+        """Return origin and insertion of route c at the last evaluation."""
+        first = int(self._plan.routes[c, coupling.R_LO]) + c
+        rows = self._last.segments[first : first + int(self._last.count[c])]
+        return rows[0, segments.G_A : segments.G_A + 3], rows[-1, segments.G_B : segments.G_B + 3]
+
+    def points(self, i: int, spacing: float | None = None) -> Array:
+        """Return the polyline of muscle i, (m, 3), world [m], at the last evaluation; empty before the first.
+
+        spacing [m]: largest distance between points; None: as many as the curvature asks for. Routes joined by
+        pulleys follow one another.
+        """
+        step = 0.0 if spacing is None else float(spacing)
+        parts = []
+        for c, route in self._routes_of(i):
+            if self._last.count[c] == 0:
+                continue
+            lo, hi = int(route[coupling.R_LO]), int(route[coupling.R_HI])
+            a, b = self._ends(c)
+            ends = (lo, hi, *a.tolist(), *b.tolist(), self._last.node, step)
+            out = np.empty((polyline.polyline(*ends, np.empty((0, 3)), 0), 3))
+            polyline.polyline(*ends, out, 0)
+            parts.append(out)
+        return np.concatenate(parts) if parts else np.empty((0, 3))
+
+    def contact_points(self, i: int) -> Array:
+        """Return first and last contact point, (k, 2, 3), world [m], of every obstacle that muscle i touches."""
+        found = []
+        for c, route in self._routes_of(i):
+            if self._last.count[c] == 0:
+                continue
+            base = self._ends(c)[0]
+            for k in range(int(route[coupling.R_LO]), int(route[coupling.R_HI])):
+                row = self._last.node[k]
+                if row[layout.KIND] != layout.VIA and row[layout.S_MODE] == layout.TOUCHED:
+                    pair = row[layout.W_P : layout.W_P + 6].reshape(2, 3)
+                    found.append(pair + base)
+        return np.array(found).reshape(-1, 2, 3)
+
+    def forces(self, i: int) -> list[tuple[int, Array, Array]]:
+        """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""
+        found = []
+        for c, route in self._routes_of(i):
+            pull = self._last.tension[i] * self._plan.weights[c]
+            first = int(route[coupling.R_LO]) + c
+            for row in self._last.segments[first : first + int(self._last.count[c])]:
+                e = row[segments.G_E : segments.G_E + 3]
+                for column, sign, index in ((segments.G_A, 1.0, row[0]), (segments.G_B, -1.0, row[1])):
+                    body = self._body(c, int(index))
+                    found.append((body, row[column : column + 3].copy(), sign * pull * e))
+        return found
+
+    def _body(self, c: int, index: int) -> int:
+        route = self._plan.routes[c]
+        if index < route[coupling.R_LO]:
+            return int(route[coupling.R_FROM_BODY])
+        if index >= route[coupling.R_HI]:
+            return int(route[coupling.R_TO_BODY])
+        return int(self._plan.links[index, coupling.L_BODY])
+
+
+@contextmanager
+def _control_callback(act: Callable[[mujoco.MjData], None]) -> Iterator[None]:
+    """Run `act` in MuJoCo's control callback, after whatever callback is there, for the length of a with block."""
+    before: Any = mujoco.get_mjcb_control()
+
+    def callback(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        if callable(before):
+            before(model, data)
+        act(data)
+
+    mujoco.set_mjcb_control(callback)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_control(before)
