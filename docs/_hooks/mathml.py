@@ -10,8 +10,11 @@ _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>'
 
 
 def _convert(found: "re.Match[str]") -> str:
-    display = "block" if found[1] == "div" else "inline"
-    return latex2mathml.converter.convert(html.unescape(found[2]).strip(), display=display)
+    block = found[1] == "div"
+    formula = latex2mathml.converter.convert(
+        html.unescape(found[2]).strip(), display="block" if block else "inline"
+    )
+    return f'<div style="margin: 1em 0">{formula}</div>' if block else formula
 
 
 def on_page_content(content: str, **_: Any) -> str:
