@@ -27,7 +27,8 @@ MAX_NEWTON = 25
 MAX_ROUNDS = 50  # changes of the set of touched obstacles, repairs included
 MAX_REPAIRS = 4
 COLD_PASSES = 3  # of obstacle-by-obstacle wrapping before Newton's method is tried
-REPAIR_PASSES = 8  # the first repair; every further one takes four times as many
+REPAIR_PASSES = 7  # the first repair; further ones take about four times as many each
+CALM = 4  # changes of the set of touched obstacles, beyond one for each, that count as going round in circles
 
 
 @jit
@@ -143,6 +144,7 @@ def solve_span(lo, hi, ends, node, tol, direct):
             evaluations += shorten(lo, hi, ends, node, COLD_PASSES)
     _remember(lo, hi, node)
     settled = False
+    changes = 0
     for _ in range(MAX_ROUNDS):
         good = True
         error = 0.0
@@ -151,22 +153,24 @@ def solve_span(lo, hi, ends, node, tol, direct):
             iterations += i
             evaluations += e
             good = error <= tol and _follow_branch(lo, hi, node)
-        if good:
+        if good and minimal(lo, hi, node):
             dropped = _drop(lo, hi, node)
             added, status = _take_in(lo, hi, ends, node)
-            if dropped + added > 0:
-                continue
-            if status != lay.CONVERGED or minimal(lo, hi, node):
+            if dropped + added == 0:
                 settled = True
                 break
-            status = lay.NOT_MINIMAL
+            changes += 1
+            if changes <= hi - lo + CALM:
+                continue
         if repairs == MAX_REPAIRS:
+            status = lay.NOT_MINIMAL if good and changes == 0 else lay.NOT_CONVERGED
             break
         if repairs == 0:
             _restore(lo, hi, ends, node)
-        passes = REPAIR_PASSES * 4**repairs if hi - lo > 1 else 1
-        evaluations += relax(lo, hi, ends, node, passes)
+        passes = REPAIR_PASSES + repairs if hi - lo > 1 else 1
+        evaluations += relax(lo, hi, ends, node, passes << 2 * repairs)
         repairs += 1
+        changes = 0
     if not settled and status != lay.NOT_MINIMAL:
         _, status = _take_in(lo, hi, ends, node)
         if _end_inside(lo, hi, ends, node):
