@@ -1,0 +1,25 @@
+"""The paper's three solvers as a method laboratory, on NumPy: NR, BFGS and Broyden's method (BR).
+
+`solve_chain` solves a whole path; `ChainProblem`, a solver of `METHODS` and `iterate` are the parts it is made of.
+"""
+
+from mjwrap.methods.bfgs import Bfgs
+from mjwrap.methods.broyden import Broyden
+from mjwrap.methods.chain import MethodResult, solve_chain
+from mjwrap.methods.iteration import Outcome, iterate
+from mjwrap.methods.newton_raphson import NewtonRaphson
+from mjwrap.methods.problem import ChainProblem
+from mjwrap.methods.registry import METHODS, make_solver
+
+__all__ = [
+    "METHODS",
+    "Bfgs",
+    "Broyden",
+    "ChainProblem",
+    "MethodResult",
+    "NewtonRaphson",
+    "Outcome",
+    "iterate",
+    "make_solver",
+    "solve_chain",
+]
