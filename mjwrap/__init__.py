@@ -9,7 +9,16 @@ from mjwrap.errors import GeometryError, ModelError, MjwrapError, PathError, Rec
 
 if TYPE_CHECKING:
     from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle, PathActuator
-    from mjwrap.paths import Contact, Obstacle, PathSolution, Status, SweepSolution, ViaPoint, solve_path, solve_sweep
+    from mjwrap.paths import (
+        Contact,
+        Obstacle,
+        PathSolution,
+        Status,
+        SweepSolution,
+        ViaPoint,
+        solve_path,
+        solve_sweep,
+    )
     from mjwrap.recording import Recorder
     from mjwrap.surfaces import Cylinder, Sphere
     from mjwrap.system import MuscleSystem

@@ -25,7 +25,6 @@ _MESSAGES = {
     "ENDPOINT_INSIDE": "the origin, the insertion or a via point lies inside the surface next to it",
     "NOT_MINIMAL": "the tangent path found is not a local minimum of length; a string would slip off it",
     "PENETRATING": "surfaces overlap where the path would touch them, so a part of it lies inside one",
-    "FOLDED": "the path turns back on itself at a contact point",
     "NON_FINITE": "a pose or an end point is not finite",
 }
 
@@ -38,7 +37,6 @@ class Status(enum.IntEnum):
     ENDPOINT_INSIDE = layout.ENDPOINT_INSIDE
     NOT_MINIMAL = layout.NOT_MINIMAL
     PENETRATING = layout.PENETRATING
-    FOLDED = layout.FOLDED
     NON_FINITE = layout.NON_FINITE
 
     @property
@@ -143,7 +141,9 @@ class PathSolution:
     `Contact` per obstacle. Where the path was not found the length is that of the last iterate, never NaN.
     """
 
-    def __init__(self, origin: tuple[float, ...], insertion: tuple[float, ...], node: Array, saved: Array) -> None:
+    def __init__(
+        self, origin: tuple[float, ...], insertion: tuple[float, ...], node: Array, saved: Array
+    ) -> None:
         self._origin, self._insertion, self._node, self._saved = origin, insertion, node, saved
         self._ends = (0, len(node), *origin, *insertion)
         self.length = 0.0
@@ -201,7 +201,9 @@ class PathSolution:
         polyline.polyline(*self._ends, self._node, step, out, 0)
         return out
 
-    def speed(self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None = None) -> float:
+    def speed(
+        self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None = None
+    ) -> float:
         """Return the lengthening speed l̇ (17) [m/s], positive when the path grows.
 
         origin_velocity, insertion_velocity (3,) [m/s]; twists (n, 6), one per obstacle or via point: linear velocity of

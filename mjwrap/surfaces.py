@@ -32,7 +32,9 @@ def _positive(surface: Surface, name: str, value: float) -> None:
     except TypeError:
         good = False
     if not good:
-        raise GeometryError(f"{type(surface).__name__}: {name} must be finite and positive [m], not {value!r}")
+        raise GeometryError(
+            f"{type(surface).__name__}: {name} must be finite and positive [m], not {value!r}"
+        )
 
 
 @dataclass(frozen=True)

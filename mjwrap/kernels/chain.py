@@ -20,9 +20,7 @@ I_ITERATIONS, I_EVALUATIONS = lay.I_ITERATIONS, lay.I_EVALUATIONS
 
 
 @jit
-def solve_chain(
-    lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row
-):
+def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     """Find the path from (ox, oy, oz) to (ix, iy, iz) over nodes lo..hi; results go to info[row].
 
     Points in the world frame [m]. The rows hold the last evaluation relative to the first point. Never raises and

@@ -224,10 +224,32 @@ def length_jacobian(
             if near == far:
                 continue
             _add_row(
-                weight, far, seg, j, G_B, row, jacobian, dofs, body_parentid, cdof, subtree_com, body_rootid[far]
+                weight,
+                far,
+                seg,
+                j,
+                G_B,
+                row,
+                jacobian,
+                dofs,
+                body_parentid,
+                cdof,
+                subtree_com,
+                body_rootid[far],
             )
             _add_row(
-                -weight, near, seg, j, G_A, row, jacobian, dofs, body_parentid, cdof, subtree_com, body_rootid[near]
+                -weight,
+                near,
+                seg,
+                j,
+                G_A,
+                row,
+                jacobian,
+                dofs,
+                body_parentid,
+                cdof,
+                subtree_com,
+                body_rootid[near],
             )
 
 

@@ -84,7 +84,9 @@ def _wrap_cylinder(k, radius, ax, ay, az, bx, by, bz, node):
     if node[k, S_MODE] != lay.COLD:
         sweep = nearest_turn(sweep, node[k, S_SWEEP])
     elif node[k, HINT] != 0.0:
-        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], radius)
+        sweep = _hinted_sweep(
+            ax, ay, bx, by, sweep, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], radius
+        )
     arc = abs(sweep) - alpha_a - alpha_b
     if arc <= CLEAR:
         _free(node, k, sweep)

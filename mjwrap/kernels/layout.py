@@ -30,8 +30,7 @@ NOT_CONVERGED = 1
 ENDPOINT_INSIDE = 2
 NOT_MINIMAL = 3
 PENETRATING = 4
-FOLDED = 5
-NON_FINITE = 6
+NON_FINITE = 5
 
 # ------------------------------------------------------------------------ columns of the saved solution
 S_MODE = 21  # COLD, FREE or TOUCHED

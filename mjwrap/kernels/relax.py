@@ -30,8 +30,16 @@ def _following(k, hi, ends, node):
             hx, hy, hz = node[j, HINT + 1], node[j, HINT + 2], node[j, HINT + 3]
             return (
                 node[j, ROT] * hx + node[j, ROT + 1] * hy + node[j, ROT + 2] * hz + node[j, POS] - ends[0],
-                node[j, ROT + 3] * hx + node[j, ROT + 4] * hy + node[j, ROT + 5] * hz + node[j, POS + 1] - ends[1],
-                node[j, ROT + 6] * hx + node[j, ROT + 7] * hy + node[j, ROT + 8] * hz + node[j, POS + 2] - ends[2],
+                node[j, ROT + 3] * hx
+                + node[j, ROT + 4] * hy
+                + node[j, ROT + 5] * hz
+                + node[j, POS + 1]
+                - ends[1],
+                node[j, ROT + 6] * hx
+                + node[j, ROT + 7] * hy
+                + node[j, ROT + 8] * hz
+                + node[j, POS + 2]
+                - ends[2],
             )
     return ends[6], ends[7], ends[8]
 

@@ -1,0 +1,102 @@
+"""The block-tridiagonal Newton step against finite differences of the residual, and how the iteration behaves."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scenes import random_scene
+
+import mjwrap as mw
+from mjwrap.kernels import geodesics, newton
+from mjwrap.kernels import layout as lay
+from mjwrap.paths import _pack
+
+Array = NDArray[np.float64]
+ROWS = ["c", "s", "cc", "sc", "css", "cscc", "csccs"]
+
+
+def solved(rng: np.random.Generator, kinds: str) -> tuple[Array, tuple[float, ...]]:
+    """Return rows of a solved scene in which every obstacle is touched, and the ends for the kernels."""
+    while True:
+        origin, insertion, row = random_scene(rng, kinds, hints=True)
+        sol = mw.solve_path(origin, insertion, row)
+        if sol.converged and all(c.active and c.arc_length > 2e-3 for c in sol.contacts):
+            node = _pack(row)
+            node[:] = sol._node
+            return node, (*origin, 0.0, 0.0, 0.0, *(insertion - origin))
+
+
+def perturb(node: Array, rng: np.random.Generator, size: float) -> Array:
+    moved = node.copy()
+    for k in range(len(node)):
+        radius = node[k, lay.DIM]
+        geodesics.displace(k, *(size * rng.normal(size=4) * (radius, radius, 1.0, radius)), moved)
+    return moved
+
+
+def residual(node: Array, ends: tuple[float, ...]) -> Array:
+    """Return h = [e.n_P, e.b_P, e'.n_Q, e'.b_Q] of every obstacle."""
+    work = node.copy()
+    newton.evaluate(0, len(work), ends, work)
+    columns = [lay.W_CP + 1, lay.W_CP + 2, lay.W_CQ + 1, lay.W_CQ + 2]
+    return work[:, columns].ravel()
+
+
+@pytest.mark.parametrize("kinds", ROWS)
+def test_step_annuls_the_linearised_residual(kinds: str) -> None:
+    """h(x + eps d) - h(x - eps d) over 2 eps equals -h(x), the error falling with eps squared, away from a solution."""
+    rng = np.random.default_rng(11)
+    for _ in range(50):
+        node, ends = solved(rng, kinds)
+        work = perturb(node, rng, 0.05)
+        newton.evaluate(0, len(work), ends, work)
+        assert newton.step(0, len(work), work)
+        step = work[:, lay.W_Y : lay.W_Y + 4].copy()
+        scale = 0.1 / max(1.0, np.abs(step / work[:, [lay.DIM]]).max(), np.abs(step[:, 2]).max())
+
+        def quotient(
+            eps: float, work: Array = work, step: Array = step, ends: tuple[float, ...] = ends
+        ) -> Array:
+            sides = []
+            for sign in (1.0, -1.0):
+                moved = work.copy()
+                for k in range(len(moved)):
+                    geodesics.displace(k, *(sign * eps * step[k]), moved)
+                sides.append(residual(moved, ends))
+            return (sides[0] - sides[1]) / (2 * eps)
+
+        wanted = -residual(work, ends)
+        coarse, fine = (np.abs(quotient(e) - wanted).max() for e in (scale, scale / 2))
+        assert fine <= coarse / 3.5 + 1e-9
+        assert fine <= 0.1 * np.abs(wanted).max() + 1e-9
+
+
+@pytest.mark.parametrize("kinds", ROWS)
+def test_convergence_is_quadratic(kinds: str) -> None:
+    """From a disturbed solution the error of an undamped iteration goes down as a multiple of its own square."""
+    rng = np.random.default_rng(12)
+    for _ in range(20):
+        node, ends = solved(rng, kinds)
+        work = perturb(node, rng, 1e-3)
+        errors = []
+        for _ in range(5):
+            error, _, _ = newton.newton(0, len(work), ends, work, 1e-15, 1)
+            errors.append(error)
+        small = [(a, b) for a, b in itertools.pairwise(errors) if 1e-7 < a < 1e-3]
+        assert all(b <= 50.0 * a * a + 1e-13 for a, b in small)
+        assert errors[-1] < 1e-12
+
+
+def test_folded_path_is_not_accepted() -> None:
+    """From the fold e = -t the residual h is zero; f is 2 sqrt 2 and the solver says that it is no solution."""
+    sol = mw.solve_path((2, 0, -2.5), (-2, 0, -0.5), [mw.Obstacle(mw.Cylinder(1.0))])
+    node = sol._node.copy()
+    node[0, lay.S_T : lay.S_T + 3] *= -1.0
+    node[0, lay.S_ARC] *= -1.0
+    ends = (2.0, 0.0, -2.5, 0.0, 0.0, 0.0, -4.0, 0.0, 2.0)
+    assert np.abs(residual(node, ends)).max() < 1e-14
+    error, _, _ = newton.newton(0, 1, ends, node, 1e-10, 25)
+    assert error == pytest.approx(np.sqrt(8.0), abs=1e-12)
