@@ -80,8 +80,8 @@ class DeGrooteFregly2016:
 class MuJoCoMuscle:
     """MuJoCo's own `<muscle>` curves, so that a native model can be compared like for like.
 
-    prm (9,): range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`; length_range (2,) of
-    the actuator [m times gear]; acc0; gear; force_range (2,) [N]. `ModelError` where the curves are undefined.
+    prm (9,): range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`; length_range (2,)
+    of the actuator [m times gear]; acc0; gear; force_range (2,) [N]. `ModelError` where the curves are undefined.
     """
 
     prm: tuple[float, ...]

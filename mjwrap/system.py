@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import GeometryError, PathError, StateError
-from mjwrap.kernels import coupling, layout, polyline, readiness, segments
+from mjwrap.kernels import coupling, drawing, layout, readiness, segments
 from mjwrap.mjcf import MuscleDeclaration, name_of, read_declarations
 from mjwrap.paths import Status
 from mjwrap.plan import Plan, build_plan
@@ -43,6 +43,7 @@ class _State:
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)
         self.scratch = mujoco.MjData(model)
+        self.time = 0.0
 
     def forget(self) -> None:
         """Start cold: no branch, no last force, no failures."""
@@ -121,6 +122,11 @@ class MuscleSystem:
         return self._last.status
 
     @property
+    def time(self) -> float:
+        """Simulation time [s] to which all results belong."""
+        return self._last.time
+
+    @property
     def failures(self) -> NDArray[np.int64]:
         """Number of steps (n,) at which a muscle's path was not found and its last good force was held."""
         return self._last.failures
@@ -195,6 +201,7 @@ class MuscleSystem:
             plan.routes, plan.weights, plan.links, state.segments, state.count, state.tension, poses.xipos, state.wrench
         )
         self._last = state
+        state.time = data.time
         if state.status.any():
             self._failed(state, data)
 
@@ -345,71 +352,63 @@ class MuscleSystem:
 
     # -------------------------------------------------------------------------------------- geometry
 
-    def _routes_of(self, i: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    def _known(self, i: int) -> int:
         if not 0 <= i < self.n:
-            raise GeometryError(f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names)}")
-        for c in np.flatnonzero(self._plan.routes[:, coupling.R_MUSCLE] == i):
-            yield int(c), self._plan.routes[c]
+            raise GeometryError(f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}")
+        return int(i)
 
-    def _ends(self, c: int) -> tuple[Array, Array]:
-        """Return origin and insertion of route c at the last evaluation."""
-        first = int(self._plan.routes[c, coupling.R_LO]) + c
-        rows = self._last.segments[first : first + int(self._last.count[c])]
-        return rows[0, segments.G_A : segments.G_A + 3], rows[-1, segments.G_B : segments.G_B + 3]
+    def _polylines(self, spacing: float | None, only: int) -> tuple[Array, NDArray[np.int64]]:
+        if spacing is not None and not (np.isfinite(spacing) and spacing > 0.0):
+            raise GeometryError(f"spacing must be finite and positive [m], not {spacing!r}")
+        state = self._last
+        starts = np.zeros(self.n + 1, dtype=np.int64)
+        given = (self._plan.routes, state.node, state.segments, state.count, state.info)
+        tail = (0.0 if spacing is None else float(spacing), only)
+        out = np.empty((drawing.polylines(*given, *tail, np.empty((0, 3)), starts), 3))
+        drawing.polylines(*given, *tail, out, starts)
+        return out, starts
+
+    def _contacts(self, only: int) -> tuple[Array, NDArray[np.int64]]:
+        state = self._last
+        starts = np.zeros(self.n + 1, dtype=np.int64)
+        given = (self._plan.routes, state.node, state.segments, state.count, only)
+        out = np.empty((drawing.contacts(*given, np.empty((0, 3)), starts), 3))
+        drawing.contacts(*given, out, starts)
+        return out, starts
 
     def points(self, i: int, spacing: float | None = None) -> Array:
         """Return the polyline of muscle i, (m, 3), world [m], at the last evaluation; empty before the first.
 
         spacing [m]: largest distance between points; None: as many as the curvature asks for. Routes joined by
-        pulleys follow one another.
+        pulleys follow one another. A muscle whose path was not found is drawn along the force that it holds.
         """
-        step = 0.0 if spacing is None else float(spacing)
-        parts = []
-        for c, route in self._routes_of(i):
-            if self._last.count[c] == 0:
-                continue
-            lo, hi = int(route[coupling.R_LO]), int(route[coupling.R_HI])
-            a, b = self._ends(c)
-            ends = (lo, hi, *a.tolist(), *b.tolist(), self._last.node, step)
-            out = np.empty((polyline.polyline(*ends, np.empty((0, 3)), 0), 3))
-            polyline.polyline(*ends, out, 0)
-            parts.append(out)
-        return np.concatenate(parts) if parts else np.empty((0, 3))
+        return self._polylines(spacing, self._known(i))[0]
+
+    def polylines(self, spacing: float | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """Return the polylines of all muscles: points (m, 3), starts (n + 1,); muscle i has starts[i]:starts[i + 1]."""
+        return self._polylines(spacing, -1)
 
     def contact_points(self, i: int) -> Array:
         """Return first and last contact point, (k, 2, 3), world [m], of every obstacle that muscle i touches."""
-        found = []
-        for c, route in self._routes_of(i):
-            if self._last.count[c] == 0:
-                continue
-            base = self._ends(c)[0]
-            for k in range(int(route[coupling.R_LO]), int(route[coupling.R_HI])):
-                row = self._last.node[k]
-                if row[layout.KIND] != layout.VIA and row[layout.S_MODE] == layout.TOUCHED:
-                    pair = row[layout.W_P : layout.W_P + 6].reshape(2, 3)
-                    found.append(pair + base)
-        return np.array(found).reshape(-1, 2, 3)
+        return self._contacts(self._known(i))[0].reshape(-1, 2, 3)
+
+    def contacts(self) -> tuple[Array, NDArray[np.int64]]:
+        """Return the contact points of all muscles, P and Q in turn: points (m, 3), starts (n + 1,)."""
+        return self._contacts(-1)
 
     def forces(self, i: int) -> list[tuple[int, Array, Array]]:
         """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""
+        state, plan = self._last, self._plan
         found = []
-        for c, route in self._routes_of(i):
-            pull = self._last.tension[i] * self._plan.weights[c]
-            first = int(route[coupling.R_LO]) + c
-            for row in self._last.segments[first : first + int(self._last.count[c])]:
-                e = row[segments.G_E : segments.G_E + 3]
+        for c in np.flatnonzero(plan.routes[:, coupling.R_MUSCLE] == self._known(i)):
+            pull = state.tension[i] * plan.weights[c]
+            first = int(plan.routes[c, coupling.R_LO]) + int(c)
+            for row in state.segments[first : first + int(state.count[c])]:
+                force = pull * row[segments.G_E : segments.G_E + 3]
                 for column, sign, index in ((segments.G_A, 1.0, row[0]), (segments.G_B, -1.0, row[1])):
-                    body = self._body(c, int(index))
-                    found.append((body, row[column : column + 3].copy(), sign * pull * e))
+                    body = int(coupling.end_body(plan.routes, plan.links, c, int(index)))
+                    found.append((body, row[column : column + 3].copy(), sign * force))
         return found
-
-    def _body(self, c: int, index: int) -> int:
-        route = self._plan.routes[c]
-        if index < route[coupling.R_LO]:
-            return int(route[coupling.R_FROM_BODY])
-        if index >= route[coupling.R_HI]:
-            return int(route[coupling.R_TO_BODY])
-        return int(self._plan.links[index, coupling.L_BODY])
 
 
 @contextmanager

@@ -79,7 +79,7 @@ def solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg,
 
 
 @jit
-def _end_body(routes, links, c, index):
+def end_body(routes, links, c, index):
     """Return the body that holds a segment's end: a node's, or the origin's or insertion's of route c."""
     if index < routes[c, R_LO]:
         return routes[c, R_FROM_BODY]
@@ -108,8 +108,8 @@ def route_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
     total = 0.0
     first = routes[c, R_LO] + c
     for j in range(first, first + seg_count[c]):
-        near = _end_body(routes, links, c, int(seg[j, G_NEAR]))
-        far = _end_body(routes, links, c, int(seg[j, G_FAR]))
+        near = end_body(routes, links, c, int(seg[j, G_NEAR]))
+        far = end_body(routes, links, c, int(seg[j, G_FAR]))
         if near != far:
             total += _rate(far, seg, j, G_B, cvel, subtree_com, body_rootid)
             total -= _rate(near, seg, j, G_A, cvel, subtree_com, body_rootid)
@@ -175,8 +175,8 @@ def body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench
         force = weights[c] * tension[routes[c, R_MUSCLE]]
         first = routes[c, R_LO] + c
         for j in range(first, first + seg_count[c]):
-            near = _end_body(routes, links, c, int(seg[j, G_NEAR]))
-            far = _end_body(routes, links, c, int(seg[j, G_FAR]))
+            near = end_body(routes, links, c, int(seg[j, G_NEAR]))
+            far = end_body(routes, links, c, int(seg[j, G_FAR]))
             if near == far:
                 continue
             fx, fy, fz = force * seg[j, G_E], force * seg[j, G_E + 1], force * seg[j, G_E + 2]
@@ -219,8 +219,8 @@ def length_jacobian(
         row, weight = routes[c, R_MUSCLE], weights[c]
         first = routes[c, R_LO] + c
         for j in range(first, first + seg_count[c]):
-            near = _end_body(routes, links, c, int(seg[j, G_NEAR]))
-            far = _end_body(routes, links, c, int(seg[j, G_FAR]))
+            near = end_body(routes, links, c, int(seg[j, G_NEAR]))
+            far = end_body(routes, links, c, int(seg[j, G_FAR]))
             if near == far:
                 continue
             _add_row(

@@ -1,0 +1,72 @@
+"""Polylines and contact points of all muscles in one call, for pictures and recordings."""
+
+from __future__ import annotations
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.coupling import R_HI, R_LO, R_MUSCLE
+from mjwrap.kernels.polyline import polyline
+from mjwrap.kernels.segments import G_A, G_B, G_FAR
+
+
+@jit
+def _append(out, count, x, y, z):
+    """Append a point where there is room; return the new count."""
+    if count < out.shape[0]:
+        out[count, 0], out[count, 1], out[count, 2] = x, y, z
+    return count + 1
+
+
+@jit
+def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
+    """Write the points of every muscle's path to out and where each muscle begins to starts (n + 1,); return how many.
+
+    only: one muscle's index, or -1 for all. Routes without a path at the last evaluation are drawn along the segments
+    that they hold. Where `out` is too short the points are counted and not written. World frame [m].
+    """
+    count = 0
+    muscle = -1
+    for c in range(routes.shape[0]):
+        while muscle < routes[c, R_MUSCLE]:
+            muscle += 1
+            starts[muscle] = count
+        if seg_count[c] == 0 or (only >= 0 and only != muscle):
+            continue
+        lo, hi = routes[c, R_LO], routes[c, R_HI]
+        first, last = lo + c, lo + c + seg_count[c] - 1
+        if info[c, lay.I_STATUS] == lay.CONVERGED:
+            count += polyline(
+                lo, hi, seg[first, G_A], seg[first, G_A + 1], seg[first, G_A + 2],
+                seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2], node, spacing, out, count,
+            )  # fmt: skip
+            continue
+        for j in range(first, last + 1):
+            count = _append(out, count, seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2])
+            count = _append(out, count, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2])
+    while muscle + 1 < starts.shape[0]:
+        muscle += 1
+        starts[muscle] = count
+    return count
+
+
+@jit
+def contacts(routes, node, seg, seg_count, only, out, starts):
+    """Write P and Q of every touched obstacle to out, two rows each, and starts (n + 1,); return how many rows."""
+    count = 0
+    muscle = -1
+    for c in range(routes.shape[0]):
+        while muscle < routes[c, R_MUSCLE]:
+            muscle += 1
+            starts[muscle] = count
+        if only >= 0 and only != muscle:
+            continue
+        first = routes[c, R_LO] + c
+        for j in range(first, first + seg_count[c] - 1):
+            k = int(seg[j, G_FAR])
+            if k < routes[c, R_HI] and node[k, lay.KIND] != lay.VIA:
+                count = _append(out, count, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2])
+                count = _append(out, count, seg[j + 1, G_A], seg[j + 1, G_A + 1], seg[j + 1, G_A + 2])
+    while muscle + 1 < starts.shape[0]:
+        muscle += 1
+        starts[muscle] = count
+    return count
