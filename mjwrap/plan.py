@@ -46,10 +46,11 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
     actuator = declared.actuator
     if int(model.actuator_actnum[actuator]) == 1:
         return readiness.FROM_ACT, int(model.actuator_actadr[actuator]), -np.inf, np.inf
-    if model.actuator_ctrllimited[actuator]:
-        low, high = (float(x) for x in model.actuator_ctrlrange[actuator])
-        return readiness.FROM_CTRL, actuator, low, high
-    return readiness.FROM_CTRL, actuator, -np.inf, np.inf
+    control = int(model.actuator_ctrladr[actuator])
+    low, high = -np.inf, np.inf
+    if model.actuator_ctrllimited[control]:
+        low, high = (float(x) for x in model.actuator_ctrlrange[control])
+    return readiness.FROM_CTRL, control, low, high
 
 
 def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:

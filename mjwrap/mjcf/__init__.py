@@ -1,0 +1,23 @@
+"""Declarations of muscles in an MjModel: what pulls, along which sites and geoms, by which law.
+
+Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendon, as it stands; and `<custom>` tuples
+whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing here changes the model.
+"""
+
+from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
+from mjwrap.mjcf.files import read_model
+from mjwrap.mjcf.names import name_of, names
+from mjwrap.mjcf.reader import read_declarations
+from mjwrap.mjcf.routes import SURFACES
+
+__all__ = [
+    "SURFACES",
+    "Declarations",
+    "MuscleDeclaration",
+    "Node",
+    "Route",
+    "name_of",
+    "names",
+    "read_declarations",
+    "read_model",
+]

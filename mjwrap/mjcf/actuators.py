@@ -1,0 +1,131 @@
+"""Native actuators: which ones mjwrap can take over, and the muscle curves that they carry.
+
+Most fields of an actuator are indexed by its id. Some actuators have several controls and outputs, so what belongs to
+these (control limits; gear, length range, acc0) is indexed by `actuator_ctrladr` and `actuator_outadr`.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.names import name_of
+from mjwrap.mjcf.routes import tendon_stops
+from mjwrap.muscles import MuJoCoMuscle
+
+OBJ = mujoco.mjtObj
+_GAINS = [
+    int(g) for g in (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtGain.mjGAIN_MUSCLE)
+]
+_BIASES = [
+    int(b) for b in (mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE, mujoco.mjtBias.mjBIAS_MUSCLE)
+]
+
+
+def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether an actuator has MuJoCo's muscle gain."""
+    return int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_MUSCLE)
+
+
+def pulled_tendon(model: mujoco.MjModel, actuator: int) -> int:
+    """Return the spatial tendon that an actuator pulls, or -1."""
+    if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
+        return -1
+    tendon = int(model.actuator_trnid[actuator, 0])
+    return -1 if is_fixed(model, tendon) else tendon
+
+
+def is_fixed(model: mujoco.MjModel, tendon: int) -> bool:
+    """Return whether a tendon is a sum of joint angles rather than a string."""
+    return int(model.wrap_type[model.tendon_adr[tendon]]) == int(mujoco.mjtWrap.mjWRAP_JOINT)
+
+
+def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
+    """Return why an actuator cannot drive a muscle of mjwrap, or None."""
+    kinds = int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
+    if kinds[0] not in _GAINS or kinds[1] not in _BIASES:
+        return "its gain or bias is neither fixed, affine nor a muscle's"
+    if int(model.actuator_plugin[actuator]) >= 0:
+        return "it belongs to a plugin"
+    if model.actuator_actearly[actuator]:
+        return "its activation acts early (actearly)"
+    if int(model.actuator_actnum[actuator]) > 1:
+        return "it has more than one activation state"
+    if int(model.actuator_actnum[actuator]) == 0 and float(model.actuator_delay[actuator]) > 0.0:
+        return "its control acts with a delay and it has no activation state"
+    return None
+
+
+def curves_reason(model: mujoco.MjModel, actuator: int) -> str | None:
+    """Return why a muscle actuator's own curves cannot be computed along a path, or None."""
+    if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
+        return "it does not pull a tendon"
+    tendon = pulled_tendon(model, actuator)
+    if tendon < 0:
+        return "its tendon is fixed, not spatial"
+    if float(model.actuator_gear[int(model.actuator_outadr[actuator]), 0]) <= 0.0:
+        return "its gear is not positive, so it pushes"
+    if model.tendon_actfrclimited[tendon]:
+        return "its tendon limits the forces of its actuators together (actuatorfrcrange)"
+    bias = int(model.actuator_biastype[actuator])
+    muscle_bias = bias == int(mujoco.mjtBias.mjBIAS_MUSCLE)
+    if bias != int(mujoco.mjtBias.mjBIAS_NONE) and not muscle_bias:
+        return "its bias is not a muscle's"
+    if muscle_bias and not np.array_equal(
+        model.actuator_gainprm[actuator, :9], model.actuator_biasprm[actuator, :9]
+    ):
+        return "its gain and bias have different parameters"
+    return None
+
+
+def native_reason(model: mujoco.MjModel, rest: mujoco.MjData, actuator: int) -> str | None:
+    """Return why a muscle actuator must stay native, or None. rest: kinematics of the reference pose."""
+    return (
+        curves_reason(model, actuator)
+        or unfit_reason(model, actuator)
+        or _inside_reason(model, rest, int(model.actuator_trnid[actuator, 0]))
+    )
+
+
+def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> str | None:
+    """Return which side site lies inside its geom, MuJoCo's sign for a string that runs inside, or None."""
+    for stop, hint in pairwise(tendon_stops(model, tendon)):
+        if stop.kind != "geom" or hint.kind != "hint":
+            continue
+        geom, site = stop.index, hint.index
+        local = rest.geom_xmat[geom].reshape(3, 3).T @ (rest.site_xpos[site] - rest.geom_xpos[geom])
+        if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+            local = local[:2]
+        if np.linalg.norm(local) < model.geom_size[geom, 0]:
+            return (
+                f"its tendon runs inside geom '{name_of(model, OBJ.mjOBJ_GEOM, geom)}' "
+                f"(side site '{name_of(model, OBJ.mjOBJ_SITE, site)}' is inside)"
+            )
+    return None
+
+
+def mujoco_law(model: mujoco.MjModel, actuator: int) -> MuJoCoMuscle:
+    """Return the native curves of a muscle actuator; `ModelError` where they are undefined."""
+    output = int(model.actuator_outadr[actuator])
+    prm = [float(p) for p in model.actuator_gainprm[actuator, :9]]
+    if int(model.actuator_biastype[actuator]) == int(mujoco.mjtBias.mjBIAS_NONE):
+        prm[7] = 0.0
+    short, long = (float(x) for x in model.actuator_lengthrange[output])
+    low, high = -np.inf, np.inf
+    if model.actuator_forcelimited[actuator]:
+        low, high = (float(x) for x in model.actuator_forcerange[actuator])
+        if low == high == 0.0:
+            raise ModelError(
+                "its force range is 0 to 0, as MuscleSystem leaves it: call release() on the MuscleSystem that holds "
+                "the model, or set actuator_forcelimited to 0"
+            )
+    return MuJoCoMuscle(
+        tuple(prm),
+        (short, long),
+        float(model.actuator_acc0[output]),
+        float(model.actuator_gear[output, 0]),
+        (low, high),
+    )

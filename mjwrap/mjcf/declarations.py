@@ -1,0 +1,75 @@
+"""What a model declares, as plain data: the ids are MuJoCo's, the parameters a law's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from mjwrap.muscles import Law
+
+
+@dataclass(frozen=True)
+class Node:
+    """One stop of a route: a via site or a wrapping geom with, perhaps, the site that hints at its side."""
+
+    site: int = -1
+    geom: int = -1
+    hint_site: int = -1
+
+
+@dataclass(frozen=True)
+class Route:
+    """An unbroken stretch of string: origin site, nodes, insertion site; weight: its share in the muscle's length."""
+
+    origin: int
+    nodes: tuple[Node, ...]
+    insertion: int
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class MuscleDeclaration:
+    """One muscle of a model: ids are MuJoCo's.
+
+    name; routes: one, or several joined by pulleys; parameters: the law's dataclass; actuator, tendon: id or -1;
+    activation_times: activation and deactivation time constants [s] where mjwrap integrates the activation itself.
+    """
+
+    name: str
+    routes: tuple[Route, ...]
+    parameters: Law
+    actuator: int = -1
+    tendon: int = -1
+    activation_times: tuple[float, float] = (0.01, 0.04)
+
+    @property
+    def law(self) -> str:
+        """Name of the muscle law."""
+        return self.parameters.law
+
+    @property
+    def origin_site(self) -> int:
+        """Site id of the origin."""
+        return self.routes[0].origin
+
+    @property
+    def insertion_site(self) -> int:
+        """Site id of the insertion."""
+        return self.routes[-1].insertion
+
+    @property
+    def via_sites(self) -> list[int]:
+        """Site ids of the via points, in order."""
+        return [node.site for route in self.routes for node in route.nodes if node.site >= 0]
+
+    @property
+    def geoms(self) -> list[int]:
+        """Geom ids of the wrapping surfaces, in order."""
+        return [node.geom for route in self.routes for node in route.nodes if node.geom >= 0]
+
+
+@dataclass(frozen=True)
+class Declarations:
+    """All muscles of a model, and the native muscle actuators that cannot be taken over, each with the reason."""
+
+    muscles: list[MuscleDeclaration]
+    native: dict[str, str] = field(default_factory=dict)

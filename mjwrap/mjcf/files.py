@@ -1,0 +1,48 @@
+"""Loading a model from a file, with errors that say what is wrong and what is there."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import mujoco
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.names import listed
+
+
+def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
+    """Load an MJCF or MJB file; `ModelError` with MuJoCo's reason where that fails.
+
+    What MuJoCo warns of becomes a Python warning.
+    """
+    file = Path(path)
+    if not file.is_file():
+        folder, what = (file, "is a folder") if file.is_dir() else (file.parent, "does not exist")
+        there = sorted(p.name for p in folder.glob("*") if p.suffix in (".xml", ".mjb"))
+        raise ModelError(f"model file {file} {what}; models in {folder}: {listed(there)}")
+    load = mujoco.MjModel.from_binary_path if file.suffix == ".mjb" else mujoco.MjModel.from_xml_path
+    with _collected_warnings() as found:
+        try:
+            model = load(os.fspath(file))
+        except (ValueError, mujoco.FatalError) as error:
+            reason = " ".join("; ".join([*found, str(error)]).split())
+            raise ModelError(f"{file} is not a model that MuJoCo can load: {reason}") from None
+    for text in found:
+        warnings.warn(f"{file}: {text}", stacklevel=2)
+    return model
+
+
+@contextmanager
+def _collected_warnings() -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings for the length of a with block; it would write them into the working folder."""
+    found: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(found.append)
+    try:
+        yield found
+    finally:
+        mujoco.set_mju_user_warning(before)

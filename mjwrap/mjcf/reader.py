@@ -1,0 +1,79 @@
+"""All declarations of a model: those that its tuples make, and its native muscle actuators."""
+
+from __future__ import annotations
+
+import mujoco
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, pulled_tendon
+from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
+from mjwrap.mjcf.names import name_of
+from mjwrap.mjcf.routes import build_routes, tendon_stops
+from mjwrap.mjcf.tuples import read_tuple
+
+OBJ = mujoco.mjtObj
+
+
+def read_declarations(model: mujoco.MjModel) -> Declarations:
+    """Read every muscle that a model declares, in the order of its actuators, then of tuples without an actuator.
+
+    Raises `ModelError` for a declaration that cannot be understood; native muscle actuators that mjwrap cannot take
+    over are left to MuJoCo and named in `native`.
+    """
+    by_actuator, free = _read_tuples(model)
+    rest = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, rest)
+    muscles: list[MuscleDeclaration] = []
+    native: dict[str, str] = {}
+    for actuator in range(model.nactuator):
+        if actuator in by_actuator:
+            muscles.append(by_actuator[actuator])
+        elif is_muscle(model, actuator):
+            reason = native_reason(model, rest, actuator)
+            if reason is None:
+                muscles.append(_read_native(model, actuator))
+            else:
+                native[name_of(model, OBJ.mjOBJ_ACTUATOR, actuator)] = reason
+    taken = [muscle.name for muscle in muscles]
+    for muscle in free:
+        if muscle.name in taken:
+            raise ModelError(
+                f"two muscles are called '{muscle.name}', one of them by a tuple without an actuator; if both are "
+                f"the same muscle, list the actuator in the tuple"
+            )
+        taken.append(muscle.name)
+    return Declarations(muscles + free, native)
+
+
+def _read_tuples(model: mujoco.MjModel) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
+    """Return the muscles of all mjwrap tuples: by actuator, and those without one."""
+    by_actuator: dict[int, MuscleDeclaration] = {}
+    named_by: dict[int, str] = {}
+    free: list[MuscleDeclaration] = []
+    for index in range(model.ntuple):
+        tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
+        if "mjwrap" not in tuple_name:
+            continue
+        muscle = read_tuple(model, index)
+        if muscle.actuator < 0:
+            free.append(muscle)
+        elif muscle.actuator in by_actuator:
+            raise ModelError(
+                f"actuator '{muscle.name}' is in two tuples, '{named_by[muscle.actuator]}' and '{tuple_name}'; it can "
+                f"drive one muscle only"
+            )
+        else:
+            by_actuator[muscle.actuator] = muscle
+            named_by[muscle.actuator] = tuple_name
+    return by_actuator, free
+
+
+def _read_native(model: mujoco.MjModel, actuator: int) -> MuscleDeclaration:
+    name, tendon = name_of(model, OBJ.mjOBJ_ACTUATOR, actuator), pulled_tendon(model, actuator)
+    try:
+        law = mujoco_law(model, actuator)
+    except ModelError as error:
+        raise ModelError(f"muscle '{name}': {error}") from None
+    return MuscleDeclaration(
+        name, build_routes(model, name, tendon_stops(model, tendon)), law, actuator, tendon
+    )

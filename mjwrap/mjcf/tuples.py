@@ -1,0 +1,119 @@
+"""A `<custom>` tuple whose name contains "mjwrap" is one muscle: its route, parameters, law and actuator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import mujoco
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.actuators import is_fixed, pulled_tendon, unfit_reason
+from mjwrap.mjcf.declarations import MuscleDeclaration
+from mjwrap.mjcf.names import listed, name_of
+from mjwrap.mjcf.parameters import activation_times, build_law, choose_law, read_numerics, read_text
+from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
+
+OBJ = mujoco.mjtObj
+
+
+@dataclass
+class _Elements:
+    """The elements of a tuple, by what they say."""
+
+    actuators: list[int] = field(default_factory=list)
+    tendons: list[int] = field(default_factory=list)
+    stops: list[Stop] = field(default_factory=list)
+    numerics: list[int] = field(default_factory=list)
+    laws: list[str] = field(default_factory=list)
+
+
+def read_tuple(model: mujoco.MjModel, index: int) -> MuscleDeclaration:
+    """Return the muscle that a tuple declares; `ModelError` names the tuple or muscle and the element at fault."""
+    tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
+    try:
+        found = _collect(model, index)
+    except ModelError as error:
+        raise ModelError(f"tuple '{tuple_name}': {error}") from None
+    actuator = found.actuators[0] if found.actuators else -1
+    tendon = found.tendons[0] if found.tendons else -1
+    if tendon < 0 <= actuator:
+        tendon = pulled_tendon(model, actuator)
+    if actuator >= 0:
+        name = name_of(model, OBJ.mjOBJ_ACTUATOR, actuator)
+    elif tendon >= 0:
+        name = name_of(model, OBJ.mjOBJ_TENDON, tendon)
+    else:
+        name = tuple_name.replace("mjwrap_", "")
+    stops = found.stops
+    if not stops:
+        if tendon < 0:
+            raise ModelError(
+                f"tuple '{tuple_name}': it has neither sites of its own nor a tendon to take them from"
+            )
+        stops = tendon_stops(model, tendon)
+    routes = build_routes(model, name, stops)
+    try:
+        unfit = unfit_reason(model, actuator) if actuator >= 0 else None
+        if unfit is not None:
+            raise ModelError(f"its actuator cannot be taken over: {unfit}")
+        given = read_numerics(model, found.numerics)
+        law = found.laws[0] if found.laws else choose_law(given)
+        parameters = build_law(model, law, actuator, given)
+        times = activation_times(given, actuator)
+    except ModelError as error:
+        raise ModelError(f"muscle '{name}' (tuple '{tuple_name}'): {error}") from None
+    return MuscleDeclaration(name, routes, parameters, actuator, tendon, times)
+
+
+def _collect(model: mujoco.MjModel, index: int) -> _Elements:
+    found = _Elements()
+    first = int(model.tuple_adr[index])
+    for j in range(first, first + int(model.tuple_size[index])):
+        kind, item, prm = (
+            OBJ(int(model.tuple_objtype[j])),
+            int(model.tuple_objid[j]),
+            float(model.tuple_objprm[j]),
+        )
+        if kind == OBJ.mjOBJ_ACTUATOR:
+            found.actuators.append(item)
+        elif kind == OBJ.mjOBJ_TENDON:
+            found.tendons.append(item)
+        elif kind == OBJ.mjOBJ_SITE:
+            found.stops.append(Stop(_site_kind(model, item, prm), item))
+        elif kind == OBJ.mjOBJ_GEOM:
+            found.stops.append(Stop("geom", item))
+        elif kind == OBJ.mjOBJ_NUMERIC:
+            found.numerics.append(item)
+        elif kind == OBJ.mjOBJ_TEXT and "law" in name_of(model, kind, item):
+            found.laws.append(read_text(model, item))
+        else:
+            what = kind.name.removeprefix("mjOBJ_").lower()
+            raise ModelError(
+                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, or "
+                f"a text whose name contains 'law'"
+            )
+    _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
+    _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)
+    if len(found.laws) > 1:
+        raise ModelError(f"at most one law makes a muscle, not {len(found.laws)}: {listed(found.laws)}")
+    if found.tendons and is_fixed(model, found.tendons[0]):
+        name = name_of(model, OBJ.mjOBJ_TENDON, found.tendons[0])
+        raise ModelError(f"tendon '{name}' is fixed: it has joints, not a path")
+    return found
+
+
+def _site_kind(model: mujoco.MjModel, site: int, prm: float) -> Literal["site", "hint"]:
+    if prm not in (0.0, 1.0):
+        name = name_of(model, OBJ.mjOBJ_SITE, site)
+        raise ModelError(
+            f"site '{name}' has prm={prm:g}; 0 makes it a stop of the path, 1 the hint of the geom before"
+        )
+    return "hint" if prm == 1.0 else "site"
+
+
+def _at_most_one(model: mujoco.MjModel, kind: mujoco.mjtObj, items: list[int]) -> None:
+    if len(items) > 1:
+        what = kind.name.removeprefix("mjOBJ_").lower()
+        there = listed(name_of(model, kind, item) for item in items)
+        raise ModelError(f"at most one {what} makes a muscle, not {len(items)}: {there}")
