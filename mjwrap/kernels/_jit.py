@@ -19,7 +19,7 @@ from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
-_NOTICE = "mjwrap: compiling its kernels, once for this machine and version (about 20 s) ..."
+_NOTICE = "mjwrap: compiling its kernels, once for this machine and version (10 to 20 s) ..."
 
 
 def source_hash() -> str:

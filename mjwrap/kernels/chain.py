@@ -133,7 +133,8 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
     """
     n = node.shape[0]
     before = np.empty((n, lay.STATE))
-    before[:, 0] = lay.COLD
+    for k in range(n):
+        before[k, 0] = lay.COLD
     for j in range(pos.shape[0]):
         for k in range(n):
             for i in range(3):

@@ -86,15 +86,18 @@ def shorten(lo, hi, ends, node, passes):
             continue
         if abs(node[k, S_SWEEP]) < 0.5 * math.pi:
             continue
-        saved[:, :] = node[lo:hi, S_MODE : S_MODE + lay.STATE]
+        for j in range(lo, hi):
+            for i in range(lay.STATE):
+                saved[j - lo, i] = node[j, S_MODE + i]
         node[k, S_SWEEP] -= math.copysign(TWO_PI, node[k, S_SWEEP])
         spent += relax(lo, hi, ends, node, passes)
         trial = path_length(lo, hi, ends, node)
         if trial < best * (1.0 - 1e-9):
             best = trial
         else:
-            node[lo:hi, S_MODE : S_MODE + lay.STATE] = saved
             for j in range(lo, hi):
+                for i in range(lay.STATE):
+                    node[j, S_MODE + i] = saved[j - lo, i]
                 if node[j, S_MODE] == TOUCHED:
                     geodesic(j, node, ends[0], ends[1], ends[2])
     return spent
