@@ -1,7 +1,7 @@
 """Keeping native actuators from pulling what mjwrap pulls.
 
 A silenced actuator keeps control, activation dynamics, gain and bias; its force is clamped to zero through
-`actuator_forcerange`, a field that MuJoCo reads at every step. The limits it had before stand in the last of its gain and
+`actuator_forcerange`, which MuJoCo reads at every step. The limits it had before stand in the last of its gain and
 bias parameters, which no actuator that mjwrap takes over uses: so a copy of a silenced model knows them too.
 """
 
