@@ -25,7 +25,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
 
     Points in the world frame [m]. The rows hold the last evaluation relative to the first point. Never raises and
     never leaves NaN in `info`: where no path is found the status says why and the length is that of the last iterate,
-    or of the straight line through the via points where even that is not finite.
+    or of straight lines where even that is not finite, NON_FINITE ones left out.
     """
     total, square = 0.0, 0.0
     status, iterations, evaluations = lay.CONVERGED, 0, 0
@@ -38,28 +38,24 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
         else:
             bx, by, bz = ix - ox, iy - oy, iz - oz
-        code, part, error, i, e = solve_span(
-            start,
-            k,
-            (ox, oy, oz, ax, ay, az, bx, by, bz),
-            node,
-            tol,
-            direct,
-        )
-        if not math.isfinite(part):
-            part = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
-            code = lay.NOT_CONVERGED
+        straight = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
+        if not math.isfinite(straight):
+            status = lay.NON_FINITE
+        elif start == k:
+            total += straight
+        else:
+            ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
+            code, part, error, i, e = solve_span(start, k, ends, node, tol, direct)
             if not math.isfinite(part):
-                part = 0.0
-                code = lay.NON_FINITE
-        if not math.isfinite(error):
-            error = 1e300
-        if status == lay.CONVERGED:
-            status = code
-        total += part
-        square += error * error
-        iterations += i
-        evaluations += e
+                part, code = straight, lay.NOT_CONVERGED
+            if not math.isfinite(error):
+                error = 1e300
+            if status == lay.CONVERGED:
+                status = code
+            total += part
+            square += error * error
+            iterations += i
+            evaluations += e
         ax, ay, az = bx, by, bz
         start = k + 1
     info[row, I_LENGTH] = total
