@@ -27,7 +27,7 @@ def activation_colors(activation: npt.ArrayLike) -> npt.NDArray[np.uint32]:
     """Colours 0xRRGGBBAA of activations (n,): blue at 0, red at 1, straight between, clipped outside."""
     share = np.clip(np.asarray(activation, dtype=np.float64), 0.0, 1.0)[..., np.newaxis]
     rgb = np.rint(_BLUE + share * (_RED - _BLUE)).astype(np.uint32)
-    return rgb[..., 0] << 24 | rgb[..., 1] << 16 | rgb[..., 2] << 8 | np.uint32(0xFF)
+    return (rgb[..., 0] << 24 | rgb[..., 1] << 16 | rgb[..., 2] << 8 | 0xFF).astype(np.uint32)
 
 
 class Table:

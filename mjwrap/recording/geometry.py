@@ -54,7 +54,7 @@ def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
 
 def pose(position: np.ndarray, quaternion: np.ndarray) -> rr.Transform3D:
     """A transform from a position (3,) [m] and a quaternion (4,) w-x-y-z."""
-    return rr.Transform3D(translation=position, quaternion=quaternion[[1, 2, 3, 0]])
+    return rr.Transform3D(translation=position, quaternion=rr.Quaternion(xyzw=quaternion[[1, 2, 3, 0]]))
 
 
 def _rgba(model: Any, geom: int) -> np.ndarray:

@@ -100,12 +100,7 @@ class Recorder:
     def _finish(self) -> None:
         self._flush()
         self._stream.finish()
-        try:
-            self._target.publish()
-        except OSError as error:
-            raise RecordingError(
-                f"recording to '{self._target.path}' failed: {error.strerror}; nothing was kept"
-            ) from error
+        self._target.publish()
         self._ended = "it is closed"
         self._finalizer.detach()
 

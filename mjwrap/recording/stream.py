@@ -1,4 +1,4 @@
-"""rerun's file writer, with errors that are raised: it reports a failed write late, or only in its own log."""
+"""One recording stream of rerun into a file, with errors that are raised."""
 
 import warnings
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from mjwrap.errors import RecordingError
-from mjwrap.recording.target import PartFile
+from mjwrap.recording.target import FilePipe, PartFile
 
 if TYPE_CHECKING:
     import rerun.blueprint as rrb
@@ -17,7 +17,7 @@ APPLICATION = "mjwrap"
 
 
 class Stream:
-    """One recording stream into a `PartFile`; every method raises RecordingError once a write has failed."""
+    """A recording stream into a `PartFile`; `send`, `wait` and `finish` raise RecordingError where it cannot grow."""
 
     def __init__(self, target: PartFile, name: str) -> None:
         self._target = target
@@ -27,11 +27,11 @@ class Stream:
                 f"cannot record to '{target.path}': rerun is switched off by the environment variable RERUN; "
                 "unset it or set RERUN=on"
             )
-        try:
-            self._recording.save(target.part)
-            rr.send_recording_name(name, recording=self._recording)
-        except (RuntimeError, ValueError, OSError) as error:
-            raise self._failed() from error
+        self._pipe = FilePipe(target.part) if FilePipe.AVAILABLE else None
+        self._recording.save(self._pipe.address if self._pipe else target.part)
+        if self._pipe:
+            self._pipe.connected()
+        rr.send_recording_name(name, recording=self._recording)
 
     def static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log what holds for the whole recording."""
@@ -56,29 +56,34 @@ class Stream:
             rr.send_record_batch(batch, recording=self._recording)
 
     def wait(self) -> None:
-        """Return once everything sent is in the file."""
+        """Return once everything sent is on its way to the file."""
         try:
             self._recording.flush()
         except (RuntimeError, ValueError, OSError) as error:
-            raise self._failed() from error
+            raise self._target.failure(error) from error
+        self._check()
 
     def finish(self) -> None:
-        """Write the footer, close the file and read its table of contents back."""
+        """Write the table of contents, close the file and read that table back."""
         self.wait()
-        self._recording.disconnect()
+        self._disconnect()
+        self._check()
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # rerun warns of a missing footer, and store() raises for it
+                warnings.simplefilter("ignore")  # rerun warns of a missing table, and store() raises for it
                 RrdReader(self._target.part).store()
         except (RuntimeError, ValueError, OSError) as error:
-            raise self._failed() from error
+            raise self._target.failure(error) from error
 
     def abandon(self) -> None:
         """Close the file, complete or not."""
-        self._recording.disconnect()
+        self._disconnect()
 
-    def _failed(self) -> RecordingError:
-        target = self._target
-        return RecordingError(
-            f"recording to '{target.path}' failed: {target.write_fault()}; nothing was kept"
-        )
+    def _disconnect(self) -> None:
+        self._recording.disconnect()
+        if self._pipe:
+            self._pipe.finish()
+
+    def _check(self) -> None:
+        if self._pipe and self._pipe.error:
+            raise self._target.failure(self._pipe.error) from self._pipe.error

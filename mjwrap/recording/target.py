@@ -2,8 +2,11 @@
 
 import contextlib
 import os
+import selectors
 import stat
+import threading
 import uuid
+from collections.abc import Callable
 from pathlib import Path
 
 from mjwrap.errors import RecordingError
@@ -24,61 +27,113 @@ class PartFile:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
         if self.path.suffix != SUFFIX:
+            example = self.path.with_suffix(SUFFIX) if self.path.name else self.path / f"run{SUFFIX}"
             raise RecordingError(
-                f"cannot record to '{self.path}': the name must end in {SUFFIX}, which is how the viewer "
-                f"knows a recording; for example '{self.path.with_suffix(SUFFIX) if self.path.name else 'run.rrd'}'"
+                f"cannot record to '{self.path}': the name must end in {SUFFIX}, which is how the viewer knows a "
+                f"recording; for example '{example}'"
             )
+        self.part = self.path.with_name(f".{self.path.name}.{os.getpid()}-{uuid.uuid4().hex[:8]}.part")
         try:
-            self._check_overwritable()
-            self.part = self.path.with_name(f".{self.path.name}.{os.getpid()}-{uuid.uuid4().hex[:8]}.part")
-            self.part.open("xb").close()
+            fault = self._overwrite_fault()
+            if not fault:
+                self.part.open("xb").close()
         except OSError as error:
-            if isinstance(error, RecordingError):
-                raise
-            raise RecordingError(f"cannot record to '{self.path}': {_reason(error, self.path)}") from error
+            fault = _reason(error, self.path)
+        if fault:
+            raise RecordingError(f"cannot record to '{self.path}': {fault}")
 
-    def _check_overwritable(self) -> None:
+    def _overwrite_fault(self) -> str:
+        """Say why `path`, where it exists, may not be replaced."""
         try:
             mode = self.path.stat().st_mode
         except FileNotFoundError:
-            return
+            return ""
         if stat.S_ISDIR(mode):
-            raise RecordingError(f"cannot record to '{self.path}': it is a folder; name a file in it")
+            return "it is a folder; name a file in it"
         if not stat.S_ISREG(mode):
-            raise RecordingError(f"cannot record to '{self.path}': it is a device or a pipe, not a file")
-        if not os.access(self.path, os.W_OK):
-            raise RecordingError(f"cannot record to '{self.path}': it exists and is write-protected")
+            return "it is a device or a pipe, not a file"
+        return "" if os.access(self.path, os.W_OK) else "it exists and is write-protected"
 
     def publish(self) -> None:
-        """Put the finished file on the disk and give it its name; OSError where the disk refuses."""
-        with self.part.open("rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(self.part, self.path)
+        """Give the finished file its name."""
+        try:
+            os.replace(self.part, self.path)
+        except OSError as error:
+            raise self.failure(error) from error
 
     def discard(self) -> None:
         """Remove the temporary file, if it is still there."""
         with contextlib.suppress(OSError):
             self.part.unlink(missing_ok=True)
 
-    def write_fault(self) -> str:
-        """Say why a write to the temporary file failed, by trying another one."""
+    def failure(self, error: Exception) -> RecordingError:
+        """The error to raise where `error` ended the recording."""
+        reason = _reason(error, self.path) if isinstance(error, OSError) else str(error)
+        return RecordingError(f"recording to '{self.path}' failed: {reason}; nothing was kept")
+
+
+class FilePipe:
+    """A pipe that rerun writes into, and a thread that carries what arrives there into a file.
+
+    rerun's own file writer says only in its log that the disk is full, and can then wait for itself for ever. Here
+    it never meets a full disk: after an error the thread goes on emptying the pipe, and `error` tells.
+    """
+
+    AVAILABLE = Path("/dev/fd").is_dir()
+
+    def __init__(self, path: Path) -> None:
+        self.error: OSError | None = None
+        self._finished = False
+        self._file = path.open("wb")
+        self._exit, self._entrance = os.pipe()
+        self._stop_seen, self._stop = os.pipe()
+        self.address = f"/dev/fd/{self._entrance}"
+        self._carrier = threading.Thread(target=self._carry, name="recording", daemon=True)
+        self._carrier.start()
+
+    def connected(self) -> None:
+        """Leave the entrance to the writer that has opened `address`."""
+        os.close(self._entrance)
+
+    def finish(self) -> None:
+        """Return once all that a writer, now closed, has written is on the disk, or `error` says why not.
+
+        A process forked meanwhile may hold the entrance open for ever, so its closing is not waited for.
+        """
+        if not self._finished:
+            self._finished = True
+            os.write(self._stop, b".")
+            self._carrier.join()
+            for end in (self._exit, self._stop_seen, self._stop):
+                os.close(end)
+
+    def _carry(self) -> None:
+        with selectors.DefaultSelector() as either:
+            for end in (self._exit, self._stop_seen):
+                either.register(end, selectors.EVENT_READ)
+            # the stop counts only where nothing is left in the pipe
+            while self._exit in (key.fd for key, _ in either.select()):
+                if not (data := os.read(self._exit, 1 << 20)):
+                    break
+                if self.error is None:
+                    self._attempt(lambda data=data: self._file.write(data))
+        self._attempt(self._file.flush)
+        self._attempt(lambda: os.fsync(self._file.fileno()))
+        self._attempt(self._file.close)
+
+    def _attempt(self, action: Callable[[], object]) -> None:
         try:
-            with self.part.open("ab") as file:
-                file.write(bytes(1 << 16))
-                file.flush()
-                os.fsync(file.fileno())
+            action()
         except OSError as error:
-            return _reason(error, self.path)
-        return "the write failed, though there is room again now"
+            self.error = self.error or error
 
 
 def _reason(error: OSError, path: Path) -> str:
     """Name the cause of an OSError, and the folder that exists where one is missing."""
-    reason = (error.strerror or str(error)).lower()
     folder = path.absolute().parent
     if isinstance(error, FileNotFoundError):
         existing = next(parent for parent in folder.parents if parent.exists())
         return f"there is no folder '{folder}' (the path exists as far as '{existing}')"
     if isinstance(error, NotADirectoryError):
         return f"'{folder}' is not a folder"
-    return reason
+    return (error.strerror or str(error)).lower()
