@@ -267,9 +267,10 @@ class MuscleSystem:
         """Advance the simulation by `nstep` time steps with the muscles' forces at every stage of the integrator.
 
         Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds other people's contributions only.
-        Raises `StateError` for a state that is not finite.
+        Raises `StateError` for a state that is not finite, and where MuJoCo finds the motion unstable and resets it.
         """
         state = self._state(data)
+        resets = _resets(data)
         runge_kutta = int(self.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
         silent = bool(int(self.model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION))
         try:
@@ -286,6 +287,11 @@ class MuscleSystem:
                     self._advance_own(state, self.model.opt.timestep)
         finally:
             self._take_back(state, data)
+        if _resets(data) > resets:
+            raise StateError(
+                f"the motion became unstable at about time {state.time:g} s and MuJoCo reset the data; "
+                f"a smaller time step or more joint damping may help"
+            )
 
     def _act(self, state: _State, data: mujoco.MjData) -> None:
         """Evaluate at the present stage of `data`, whose kinematics are fresh, and put the wrenches in."""
@@ -341,9 +347,8 @@ class MuscleSystem:
                 state.forget()
                 state.written[:] = False
         else:
-            state = self._state(data)
-            self._take_back(state, data)
-            state.forget()
+            self._last = self._state(data)
+            self._take_back(self._last, data)
         self._last.forget()
 
     def release(self) -> None:
@@ -409,6 +414,17 @@ class MuscleSystem:
                     body = int(coupling.end_body(plan.routes, plan.links, c, int(index)))
                     found.append((body, row[column : column + 3].copy(), sign * force))
         return found
+
+
+_BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
+_BADQVEL = int(mujoco.mjtWarning.mjWARN_BADQVEL)
+_BADQACC = int(mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+def _resets(data: mujoco.MjData) -> int:
+    """Return how often MuJoCo has found the state not finite or too large; it resets the data then."""
+    number = data.warning.number
+    return int(number[_BADQPOS]) + int(number[_BADQVEL]) + int(number[_BADQACC])
 
 
 @contextmanager
