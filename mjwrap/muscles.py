@@ -60,7 +60,9 @@ class DeGrooteFregly2016:
             max_contraction_velocity=self.max_contraction_velocity,
         )
         slack, angle, damping = self.tendon_slack_length, self.pennation_angle, self.fiber_damping
-        _require(self, math.isfinite(slack) and slack >= 0.0, "tendon_slack_length", slack, "finite and >= 0 [m]")
+        _require(
+            self, math.isfinite(slack) and slack >= 0.0, "tendon_slack_length", slack, "finite and >= 0 [m]"
+        )
         _require(self, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
         _require(self, math.isfinite(damping) and damping >= 0.0, "fiber_damping", damping, "finite and >= 0")
 
@@ -74,6 +76,9 @@ class DeGrooteFregly2016:
             self.max_contraction_velocity,
             self.fiber_damping,
         )
+
+
+_PRM = ("range[0]", "range[1]", "force", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax")
 
 
 @dataclass(frozen=True)
@@ -94,11 +99,18 @@ class MuJoCoMuscle:
 
     def __post_init__(self) -> None:
         _require(self, len(self.prm) == 9, "prm", len(self.prm), "nine numbers")
-        _require(self, all(math.isfinite(p) for p in self.prm), "prm", math.nan, "finite")
+        for name, value in zip(_PRM, self.prm, strict=True):
+            _require(self, math.isfinite(value), name, value, "finite")
+        _require(self, math.isfinite(self.acc0), "acc0", self.acc0, "finite")
+        _require(self, math.isfinite(self.gear) and self.gear > 0.0, "gear", self.gear, "finite and positive")
         low, high = self.length_range
-        _require(self, high > low, "length range", low - high, "increasing: optimal fibre length is zero otherwise")
+        _require(
+            self, high > low, "length range", low - high, "increasing: optimal fibre length is zero otherwise"
+        )
         _require(self, self.prm[1] > self.prm[0], "range", self.prm[1], f"above {self.prm[0]}")
         _positive(self, vmax=self.prm[6], lmax=self.prm[5])
+        least, most = self.force_range
+        _require(self, least <= most, "force range", least, f"at most {most}")
 
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of the kernel's section."""

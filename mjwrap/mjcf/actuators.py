@@ -75,7 +75,7 @@ def curves_reason(model: mujoco.MjModel, actuator: int) -> str | None:
     if bias != int(mujoco.mjtBias.mjBIAS_NONE) and not muscle_bias:
         return "its bias is not a muscle's"
     if muscle_bias and not np.array_equal(
-        model.actuator_gainprm[actuator, :9], model.actuator_biasprm[actuator, :9]
+        model.actuator_gainprm[actuator, :9], model.actuator_biasprm[actuator, :9], equal_nan=True
     ):
         return "its gain and bias have different parameters"
     return None
@@ -99,7 +99,7 @@ def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> s
         local = rest.geom_xmat[geom].reshape(3, 3).T @ (rest.site_xpos[site] - rest.geom_xpos[geom])
         if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
             local = local[:2]
-        if np.linalg.norm(local) < model.geom_size[geom, 0]:
+        if np.linalg.norm(local) < model.geom_size[geom, 0] < np.inf:
             return (
                 f"its tendon runs inside geom '{name_of(model, OBJ.mjOBJ_GEOM, geom)}' "
                 f"(side site '{name_of(model, OBJ.mjOBJ_SITE, site)}' is inside)"

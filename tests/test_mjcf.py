@@ -1,0 +1,386 @@
+"""Every form in which a model declares muscles, read into what it means; native tendons agree with MuJoCo."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from declared_models import (
+    ARM,
+    EXTENSOR,
+    HILL,
+    MUSCLE,
+    compiled,
+    declared,
+    element,
+    numerics,
+    tendon_jacobian,
+)
+from mjcf_reading import MODELS
+
+import mjwrap as mw
+from mjwrap.mjcf import MuscleDeclaration, Node, Route, names, read_declarations, read_model
+
+SITE, GEOM = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
+LENGTH = 1e-13  # [m] sums of a dozen terms below one metre
+RATE = 1e-12  # [m/rad], the same
+PULLEYS = """<spatial name="extensor">
+  <site site="origin"/> <geom geom="elbow" sidesite="elbow_side"/> <site site="via"/>
+  <pulley divisor="2"/> <site site="via"/> <site site="middle"/> <geom geom="ball" sidesite="ball_side"/>
+  <site site="insertion"/>
+  <pulley divisor="3"/> <site site="via"/> <site site="insertion"/></spatial>"""
+TWO_SITES = '<spatial name="extensor"><site site="origin"/><site site="via"/></spatial>'
+ROW = [
+    element("site", "origin"),
+    element("geom", "elbow"),
+    element("site", "elbow_side", 1),
+    element("geom", "ball"),
+    element("geom", "wrist"),
+    element("site", "wrist_side", 1),
+    element("site", "insertion"),
+]
+
+
+def ids(model: mujoco.MjModel, kind: mujoco.mjtObj, *wanted: str) -> list[int]:
+    return [mujoco.mj_name2id(model, kind, name) for name in wanted]
+
+
+def only(model: mujoco.MjModel) -> MuscleDeclaration:
+    """The one muscle of a model."""
+    found = read_declarations(model)
+    assert not found.native
+    (muscle,) = found.muscles
+    return muscle
+
+
+# ------------------------------------------------------------------------------------ native tendons
+
+
+def test_a_native_muscle_is_a_declaration_as_it_stands() -> None:
+    model = compiled()
+    muscle = only(model)
+    origin, side, via, middle, ball_side, insertion = ids(
+        model, SITE, "origin", "elbow_side", "via", "middle", "ball_side", "insertion"
+    )
+    elbow, ball = ids(model, GEOM, "elbow", "ball")
+    nodes = (
+        Node(geom=elbow, hint_site=side),
+        Node(site=via),
+        Node(site=middle),
+        Node(geom=ball, hint_site=ball_side),
+    )
+    assert muscle.routes == (Route(origin, nodes, insertion),)
+    assert (muscle.name, muscle.law, muscle.actuator, muscle.tendon) == ("extensor", "mujoco", 0, 0)
+    assert (muscle.origin_site, muscle.insertion_site) == (origin, insertion)
+    assert muscle.via_sites == [via, middle]
+    assert muscle.geoms == [elbow, ball]
+    assert isinstance(muscle.parameters, mw.MuJoCoMuscle)
+    assert muscle.parameters.prm == tuple(model.actuator_gainprm[0, :9])
+    assert muscle.parameters.length_range == (0.3, 0.6)
+
+
+def test_a_geom_without_a_side_site_has_no_hint() -> None:
+    tendon = EXTENSOR.replace(' sidesite="ball_side"', "")
+    model = compiled(tendon=tendon)
+    assert [node.hint_site for node in only(model).routes[0].nodes if node.geom >= 0] == [
+        *ids(model, SITE, "elbow_side"),
+        -1,
+    ]
+
+
+def test_pulleys_divide_a_muscle_into_weighted_routes() -> None:
+    model = compiled(tendon=PULLEYS)
+    routes = only(model).routes
+    assert [route.weight for route in routes] == [1.0, 1 / 2, 1 / 3]
+    via, insertion = ids(model, SITE, "via", "insertion")
+    assert [(route.origin, route.insertion) for route in routes[1:]] == [(via, insertion)] * 2
+
+
+@pytest.mark.parametrize("tendon", [EXTENSOR, PULLEYS], ids=["tendon", "pulleys"])
+def test_length_speed_jacobian_and_force_are_mujocos(tendon: str) -> None:
+    """Over poses at which no string passes a surface on the side away from its side site: there MuJoCo's jumps."""
+    model = compiled(tendon=tendon)
+    native = compiled(tendon=tendon)
+    data, twin = mujoco.MjData(model), mujoco.MjData(native)
+    muscles = mw.MuscleSystem(model)
+    rng = np.random.default_rng(20)
+    touched = set()
+    for _ in range(60):
+        twin.qpos[:] = data.qpos[:] = rng.uniform((-0.6, -0.4), (2.2, 1.2))
+        twin.qvel[:] = data.qvel[:] = rng.normal(size=2)
+        twin.act[:] = data.act[:] = rng.uniform(0, 1)
+        mujoco.mj_forward(native, twin)
+        muscles.reset(data)
+        muscles.apply(data)
+        jacobian = muscles.length_jacobian(data)
+        assert muscles.length == pytest.approx(twin.ten_length, abs=LENGTH)
+        assert muscles.velocity == pytest.approx(twin.ten_velocity, abs=LENGTH * 10)
+        assert jacobian == pytest.approx(tendon_jacobian(native, twin), abs=RATE)
+        assert muscles.tension == pytest.approx(-twin.actuator_force, rel=1e-10)
+        mujoco.mj_forward(model, data)
+        assert data.qacc == pytest.approx(twin.qacc, rel=1e-9, abs=1e-9)
+        touched.add(len(muscles.contact_points(0)))
+    assert touched == {0, 1, 2}
+
+
+# -------------------------------------------------------------------- native muscles that stay native
+
+
+def test_a_tendon_that_runs_inside_its_geom_stays_native() -> None:
+    tendon = EXTENSOR.replace('"elbow_side"', '"elbow_inside"')
+    found = read_declarations(compiled(tendon=tendon))
+    assert found.muscles == []
+    assert "inside geom 'elbow' (side site 'elbow_inside' is inside)" in found.native["extensor"]
+
+
+FIXED = EXTENSOR + '<fixed name="sum"><joint joint="elbow" coef="1"/></fixed>'
+LIMITED = EXTENSOR.replace('"extensor"', '"extensor" actuatorfrcrange="-50 50"')
+CURVES = 'gainprm="0.75 1.05 100 200 0.5 1.6 1.5 1.3 1.2" lengthrange="0.3 0.6"'
+STAYS_NATIVE = {
+    "joint": (EXTENSOR, '<muscle name="m" joint="elbow" lengthrange="-1 1"/>', "does not pull a tendon"),
+    "fixed": (FIXED, '<muscle name="m" tendon="sum" lengthrange="-1 1"/>', "tendon is fixed"),
+    "gear": (
+        EXTENSOR,
+        '<muscle name="m" tendon="extensor" gear="-1" lengthrange="-1 -.1"/>',
+        "gear is not positive",
+    ),
+    "tendon limit": (
+        LIMITED,
+        '<muscle name="m" tendon="extensor" lengthrange="0.3 0.6"/>',
+        "actuatorfrcrange",
+    ),
+    "bias": (
+        EXTENSOR,
+        f'<general name="m" tendon="extensor" gaintype="muscle" biastype="affine" {CURVES}/>',
+        "bias is not a muscle's",
+    ),
+    "two sets": (
+        EXTENSOR,
+        f'<general name="m" tendon="extensor" gaintype="muscle" biastype="muscle" {CURVES}'
+        ' biasprm="0.75 1.05 90 200 0.5 1.6 1.5 1.3 1.2"/>',
+        "different parameters",
+    ),
+    "early": (
+        EXTENSOR,
+        f'<general name="m" tendon="extensor" gaintype="muscle" dyntype="filter" actearly="true" {CURVES}/>',
+        "acts early",
+    ),
+    "delay": (
+        EXTENSOR,
+        f'<general name="m" tendon="extensor" gaintype="muscle" delay="0.01" nsample="8" {CURVES}/>',
+        "with a delay",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", STAYS_NATIVE)
+def test_what_mjwrap_cannot_drive_stays_native_and_pulls_on(case: str) -> None:
+    tendon, actuator, reason = STAYS_NATIVE[case]
+    model = compiled(tendon=tendon, actuator=MUSCLE + actuator if case != "tendon limit" else actuator)
+    muscles = mw.MuscleSystem(model)
+    assert list(muscles.native) == ["m"]
+    assert reason in muscles.native["m"]
+    assert "m" not in muscles.names
+    data = mujoco.MjData(model)
+    data.ctrl[:] = data.act[:] = 0.5
+    mujoco.mj_step(model, data, 8)  # past the delay
+    assert data.actuator("m").force[0] != 0.0
+
+
+def test_passive_curves_without_a_bias_do_not_pull() -> None:
+    model = compiled(actuator=f'<general name="m" tendon="extensor" gaintype="muscle" {CURVES}/>')
+    parameters = only(model).parameters
+    assert isinstance(parameters, mw.MuJoCoMuscle)
+    assert parameters.prm[7] == 0.0
+
+
+def test_actuators_with_several_controls_shift_nothing() -> None:
+    """Controls, gears and length ranges have addresses of their own where an actuator has three of each."""
+    xml = ARM.format(tendon=EXTENSOR, actuator='<orientation joint="ball"/>' + MUSCLE, custom="", option="")
+    extra = '<body pos="1 0 0"><joint name="ball" type="ball"/><geom size="0.1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(xml.replace("</worldbody>", extra))
+    assert (model.nu, model.nactuator) == (4, 2)
+    muscle = only(model)
+    assert muscle.name == "extensor"
+    assert muscle.parameters == only(compiled()).parameters
+    straight = f'<general name="extensor" tendon="extensor" ctrlrange="0 0.4" gaintype="muscle" {CURVES}/>'
+    model = mujoco.MjModel.from_xml_string(xml.replace("</worldbody>", extra).replace(MUSCLE, straight))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 0.1, 0.2, 0.3, 0.9
+    muscles = mw.MuscleSystem(model)
+    muscles.forward(data)
+    assert muscles.activation == [0.4]
+
+
+# -------------------------------------------------------------------------------------------- tuples
+
+
+def test_a_tuple_has_a_route_of_its_own_with_surfaces_in_a_row() -> None:
+    model = compiled(custom=declared([element("actuator", "extensor"), *ROW], HILL))
+    muscle = only(model)
+    origin, side, wrist_side, insertion = ids(model, SITE, "origin", "elbow_side", "wrist_side", "insertion")
+    elbow, ball, wrist = ids(model, GEOM, "elbow", "ball", "wrist")
+    nodes = Node(geom=elbow, hint_site=side), Node(geom=ball), Node(geom=wrist, hint_site=wrist_side)
+    assert muscle.routes == (Route(origin, nodes, insertion),)
+    assert (muscle.name, muscle.actuator, muscle.tendon) == ("extensor", 0, 0)
+    assert muscle.parameters == mw.DeGrooteFregly2016(600.0, 0.12, 0.3)
+
+
+def test_every_hill_parameter_is_found_by_what_its_name_contains() -> None:
+    values = HILL | {"pennation_angle": 0.2, "max_contraction_velocity": 8.0, "fiber_damping": 0.05}
+    model = compiled(custom=declared([element("actuator", "extensor")], values))
+    assert only(model).parameters == mw.DeGrooteFregly2016(600.0, 0.12, 0.3, 0.2, 8.0, 0.05)
+
+
+def test_a_tuple_without_a_route_takes_its_tendons() -> None:
+    """The actuator's tendon, or one that the tuple names instead."""
+    native = only(compiled()).routes
+    by_actuator = only(compiled(custom=declared([element("actuator", "extensor")], HILL)))
+    assert by_actuator.routes == native
+    other = EXTENSOR + TWO_SITES.replace("extensor", "other")
+    model = compiled(
+        tendon=other, custom=declared([element("actuator", "extensor"), element("tendon", "other")], HILL)
+    )
+    muscle = only(model)
+    origin, via = ids(model, SITE, "origin", "via")
+    assert muscle.routes == (Route(origin, (), via),)
+    assert muscle.tendon == 1
+
+
+def test_a_tuple_without_an_actuator_is_called_like_its_tendon_or_itself() -> None:
+    custom = declared([element("tendon", "extensor")], HILL) + declared(
+        ROW, {"optimal_force": 50.0}, muscle="rope"
+    )
+    found = read_declarations(compiled(actuator="", custom=custom))
+    assert [(m.name, m.actuator, m.law) for m in found.muscles] == [
+        ("extensor", -1, "degroote_fregly_2016"),
+        ("rope", -1, "path_actuator"),
+    ]
+
+
+def test_activation_time_constants_of_a_muscle_without_an_actuator() -> None:
+    values = HILL | {"activation_time_constants": (0.02, 0.06)}
+    model = compiled(actuator="", custom=declared([element("tendon", "extensor")], values))
+    assert only(model).activation_times == (0.02, 0.06)
+    model = compiled(actuator="", custom=declared([element("tendon", "extensor")], HILL))
+    assert only(model).activation_times == (0.01, 0.04)
+
+
+@pytest.mark.parametrize(
+    ("values", "law"),
+    [
+        (HILL, "degroote_fregly_2016"),
+        ({"optimal_force": 10.0}, "path_actuator"),
+        ({}, "mujoco"),
+    ],
+)
+@pytest.mark.parametrize("named", [True, False])
+def test_a_law_is_named_or_follows_from_the_parameters(
+    values: dict[str, float], law: str, named: bool
+) -> None:
+    model = compiled(custom=declared([element("actuator", "extensor")], values, law if named else None))
+    assert only(model).law == law
+
+
+def test_tuples_that_are_not_mjwraps_are_left_alone() -> None:
+    custom = '<tuple name="others"><element objtype="body" objname="hand"/></tuple>'
+    assert only(compiled(custom=custom)) == only(compiled())
+
+
+def test_muscles_come_in_the_order_of_actuators_then_of_tuples() -> None:
+    second = TWO_SITES.replace("extensor", "second")
+    custom = declared(ROW, HILL, muscle="free") + declared([element("actuator", "b")], HILL, muscle="b")
+    pulled = '<muscle name="{}" tendon="{}" lengthrange="0.3 0.6"/>'
+    actuator = (
+        pulled.format("a", "extensor") + '<motor name="c" joint="elbow"/>' + pulled.format("b", "second")
+    )
+    muscles = mw.MuscleSystem(compiled(tendon=EXTENSOR + second, actuator=actuator, custom=custom))
+    assert muscles.names == ["a", "b", "free"]
+    assert [declaration.actuator for declaration in muscles.declarations] == [0, 2, -1]
+
+
+# ------------------------------------------------------------------------------------- round trips
+
+
+def described(model: mujoco.MjModel, prefix: str = "", suffix: str = "") -> list[tuple[object, ...]]:
+    """All that is declared, by names without prefix and suffix, so that models can be compared."""
+
+    def plain(kind: mujoco.mjtObj, index: int) -> str:
+        name = mujoco.mj_id2name(model, kind, index) if index >= 0 else ""
+        assert name.startswith(prefix) or not name
+        return name.removeprefix(prefix).removesuffix(suffix)
+
+    found = []
+    for muscle in read_declarations(model).muscles:
+        if not (muscle.name.startswith(prefix) and muscle.name.endswith(suffix)):
+            continue
+        routes = [
+            (
+                plain(SITE, route.origin),
+                [(plain(SITE, n.site), plain(GEOM, n.geom), plain(SITE, n.hint_site)) for n in route.nodes],
+                plain(SITE, route.insertion),
+                route.weight,
+            )
+            for route in muscle.routes
+        ]
+        name, law = muscle.name.removeprefix(prefix).removesuffix(suffix), muscle.parameters
+        if isinstance(
+            law, mw.MuJoCoMuscle
+        ):  # acc0 is not declared: the compiler computes it from the inertias
+            law = replace(law, acc0=0.0)
+        found.append((name, routes, law, muscle.activation_times))
+    return found
+
+
+def everything() -> str:
+    """A model with a native muscle, a tuple with an actuator, and one without."""
+    made, named = numerics(HILL | {"activation_time_constants": (0.02, 0.06)}, "free")
+    custom = made + f'<tuple name="mjwrap_free">{"".join(ROW)}{named}</tuple>'
+    custom += declared([element("actuator", "b"), *ROW], {"optimal_force": 70.0}, "path_actuator", "b")
+    second = '<muscle name="b" tendon="extensor" lengthrange="0.3 0.6"/>'
+    return ARM.format(tendon=PULLEYS, actuator=MUSCLE + second, custom=custom, option="")
+
+
+def test_saving_a_spec_keeps_declarations() -> None:
+    spec = mujoco.MjSpec.from_string(everything())
+    model = spec.compile()
+    again = mujoco.MjModel.from_xml_string(spec.to_xml())
+    assert len(described(model)) == 3
+    assert described(again) == described(model)
+
+
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # that is what is tested
+@pytest.mark.parametrize("affixes", [("left_", ""), ("", "_r"), ("left_", "_r")])
+def test_attaching_keeps_declarations_under_prefix_and_suffix(
+    affixes: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo logs its warnings into the working folder
+    prefix, suffix = affixes
+    alone = described(mujoco.MjModel.from_xml_string(everything()))
+    parent = mujoco.MjSpec()
+    for place, extra in enumerate(("", "2")):
+        child = mujoco.MjSpec.from_string(everything())
+        frame = parent.worldbody.add_frame(pos=[0, place, 0])
+        parent.attach(child, prefix=extra + prefix, suffix=suffix + extra, frame=frame)
+    model = parent.compile()
+    assert len(read_declarations(model).muscles) == 6
+    assert described(model, prefix, suffix) == alone
+    assert described(model, "2" + prefix, suffix + "2") == alone
+
+
+# ------------------------------------------------------------------------------------------- files
+
+
+def test_models_are_read_from_xml_and_binary_files(tmp_path: Path) -> None:
+    source = MODELS / "elbow" / "elbow.xml"
+    model = read_model(source)
+    assert described(read_model(os.fspath(source))) == described(model)
+    mujoco.mj_saveModel(model, str(tmp_path / "elbow.mjb"), None)
+    assert described(read_model(tmp_path / "elbow.mjb")) == described(model)
+    assert names(model, SITE, 2) == ["head_side", "elbow_side"]
