@@ -38,8 +38,12 @@ def make_solver(method: str, **options: Any) -> Solver[Any]:
 def _check(method: str, name: str, value: Any, default: Any) -> None:
     if isinstance(value, str) and value == default:
         return
-    number = isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
-    if number and (value > 0 or (value == 0 and name == "lam")):
+    if (
+        isinstance(value, (int, float))
+        and not isinstance(value, bool)
+        and np.isfinite(value)
+        and (value > 0 or (value == 0 and name == "lam"))
+    ):
         return
     words = f"{default!r} or " if isinstance(default, str) else ""
     raise GeometryError(f"method {method!r}: {name} must be {words}a finite positive number, not {value!r}")
