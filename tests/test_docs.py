@@ -72,9 +72,7 @@ def run(page: str, text: str) -> None:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(code, names)
-        if snippet.printed is not None and not checker.check_output(
-            snippet.printed, printed.getvalue(), flags
-        ):
+        if snippet.printed is not None and not same(snippet.printed, printed.getvalue()):
             pytest.fail(f"{page}:{snippet.line} printed\n{printed.getvalue()}and not\n{snippet.printed}")
 
 
