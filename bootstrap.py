@@ -150,9 +150,9 @@ def run_demo() -> int:
     missing = [name for name in (DEMO_RECORDING, DEMO_PLOT) if not (ROOT / name).is_file()]
     if missing:
         raise SetupError(f"the run ended well but did not leave {' and '.join(missing)}")
-    say(f"recording: {ROOT / DEMO_RECORDING}")
-    say(f"plot:      {ROOT / DEMO_PLOT}")
-    say(f"look at the recording with: {python.relative_to(ROOT)} scripts/replay.py {DEMO_RECORDING}")
+    say(f"the plot is {ROOT / DEMO_PLOT}")
+    say(f"the recording is {ROOT / DEMO_RECORDING}")
+    say(f"look at it with: {python.relative_to(ROOT)} scripts/replay.py {DEMO_RECORDING}")
     return 0
 
 
