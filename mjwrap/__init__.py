@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mjwrap.errors import GeometryError, ModelError, MjwrapError, PathError, RecordingError, StateError
+from mjwrap.errors import GeometryError, ModelError, MjwrapError, PathError, RecordingError, SignalError, StateError
 
 if TYPE_CHECKING:
     from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle, PathActuator
@@ -58,6 +58,7 @@ __all__ = [
     "PathSolution",
     "RecordingError",
     "Recorder",
+    "SignalError",
     "Sphere",
     "StateError",
     "Status",

@@ -35,5 +35,12 @@ class StateError(MjwrapError, ValueError):
     """A simulation state (position, velocity, activation, control) is not finite."""
 
 
+class SignalError(MjwrapError, ValueError):
+    """An excitation, control or prescribed motion cannot be read: a wrong pattern, file or name.
+
+    The message names the pattern, or file, line and column, and lists what exists.
+    """
+
+
 class RecordingError(MjwrapError, OSError):
     """A recording could not be written: no such folder, no permission, or no space left."""

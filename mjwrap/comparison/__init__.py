@@ -1,0 +1,24 @@
+"""MuJoCo's own tendons and mjwrap's paths, side by side: the same poses and motion, and which of the two is right.
+
+`compare_poses` sweeps every joint and draws random poses; `compare_motion` runs both forward. Every path is judged by
+its geometry (`geometry.judge`), not by trusting either program.
+"""
+
+from __future__ import annotations
+
+from mjwrap.comparison.jumps import Jump
+from mjwrap.comparison.motion import MotionDifference, compare_motion, with_native_laws
+from mjwrap.comparison.run import PoseComparison, compare_poses
+from mjwrap.comparison.verdict import AGREE, MuscleSummary, Outcome
+
+__all__ = [
+    "AGREE",
+    "Jump",
+    "MotionDifference",
+    "MuscleSummary",
+    "Outcome",
+    "PoseComparison",
+    "compare_motion",
+    "compare_poses",
+    "with_native_laws",
+]

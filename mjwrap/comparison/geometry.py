@@ -1,0 +1,212 @@
+"""Is a given path over one cylinder or sphere a true geodesic? Judged from the geometry alone, for many poses at once.
+
+Nothing of mjwrap's solver, nor of MuJoCo's wrapping, is used here. A path from a to b is either straight, or runs
+straight to p, along the surface to q, and straight to b. It is what a string would do if it touches the surface
+tangentially, follows a geodesic between p and q, passes below the surface nowhere, and is a local minimum of length.
+All points are (T, 3) in the surface's frame [m]; the axis of a cylinder is z.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+ANGLE = 1e-9  # [rad] largest corner; both programs' contact points are closed-form or polished to 1e-10
+DEPTH = 1e-12  # [radii] deepest that a straight segment may pass below a surface, for rounding alone
+
+
+class Fault(enum.IntEnum):
+    """Why a path is not one that a string would take."""
+
+    NONE = 0
+    NON_FINITE = 1
+    INSIDE = 2
+    ENDPOINT_INSIDE = 3
+    THROUGH = 4
+    OFF_SURFACE = 5
+    CORNER = 6
+    NOT_GEODESIC = 7
+    LONG_WAY = 8
+    WRONG_LENGTH = 9
+
+    @property
+    def words(self) -> str:
+        """What is wrong, in one clause; {} is its measure."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    Fault.NONE: "a true geodesic",
+    Fault.NON_FINITE: "it is not finite",
+    Fault.INSIDE: "it runs inside the surface, with one contact point and a corner of {:.2g} rad",
+    Fault.ENDPOINT_INSIDE: "an end point lies {:.2g} m inside the surface, where no geodesic path exists",
+    Fault.THROUGH: "it passes straight through the surface, {:.2g} m deep",
+    Fault.OFF_SURFACE: "its contact points lie {:.2g} m off the surface",
+    Fault.CORNER: "it meets the surface with a corner of {:.2g} rad",
+    Fault.NOT_GEODESIC: "what lies on the surface misses the geodesic by {:.2g} m",
+    Fault.LONG_WAY: "it takes the long way round the sphere ({:.2g} rad about its centre), a saddle, not a minimum",
+    Fault.WRONG_LENGTH: "its length differs by {:.2g} m from its own segments and arcs",
+}
+
+
+class Judgement(NamedTuple):
+    """fault (T,) and its measure (T,); arc (T,) on the surface [m]; turn (T,): which branch, see below.
+
+    turn is the angle [rad] by which the path goes round a cylinder's axis, counter-clockwise positive. Two paths
+    between the same points are on the same branch if it is the same; else it differs by whole turns. On a sphere: zero.
+    """
+
+    fault: Ints
+    measure: Array
+    arc: Array
+    turn: Array
+
+
+def _norm(v: Array) -> Array:
+    return np.sqrt(np.einsum("ij,ij->i", v, v))
+
+
+def _dot(u: Array, v: Array) -> Array:
+    return np.einsum("ij,ij->i", u, v)
+
+
+def _radial(v: Array, cylinder: bool) -> Array:
+    """Return the part of v at right angles to the axis, or v itself on a sphere."""
+    return v * np.array([1.0, 1.0, 0.0]) if cylinder else v
+
+
+def clearance(a: Array, b: Array, cylinder: bool) -> Array:
+    """Return the least distance (T,) of the straight segments ab from the axis or centre [m]."""
+    start, step = _radial(a, cylinder), _radial(b - a, cylinder)
+    square = _dot(step, step)
+    place = np.clip(-_dot(start, step) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    return _norm(start + place[:, None] * step)
+
+
+def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array) -> Judgement:
+    """Judge paths from a to b (T, 3) over one surface; p, q (T, 3) count where `touched` (T,)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        straight = _judge_straight(cylinder, radius, a, b)
+        wrapped = _judge_wrapped(cylinder, radius, a, b, p, q)
+        parts = (np.where(touched, w, s) for w, s in zip(wrapped, straight, strict=True))
+        fault, measure, arc, turn = parts
+        inside = radius - np.minimum(_norm(_radial(a, cylinder)), _norm(_radial(b, cylinder)))
+        for here, name, size in (
+            ((inside > DEPTH * radius) & (fault != Fault.INSIDE), Fault.ENDPOINT_INSIDE, inside),
+            (
+                ~np.isfinite(a + b + np.where(touched[:, None], p + q, 0.0)).all(axis=1),
+                Fault.NON_FINITE,
+                inside,
+            ),
+        ):
+            fault, measure = np.where(here, name, fault), np.where(here, size, measure)
+    return Judgement(fault.astype(np.int64), measure, arc, turn)
+
+
+def _judge_straight(cylinder: bool, radius: float, a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
+    depth = radius - clearance(a, b, cylinder)
+    fault = np.where(depth > DEPTH * radius, Fault.THROUGH, Fault.NONE)
+    turn = np.zeros(len(a))
+    if cylinder:
+        cross, dot = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
+        turn = np.arctan2(cross, dot)
+    return fault.astype(np.float64), depth, np.zeros(len(a)), turn
+
+
+def _judge_wrapped(
+    cylinder: bool, radius: float, a: Array, b: Array, p: Array, q: Array
+) -> tuple[Array, ...]:
+    # The longer straight segment says which way the path arrives; walk from that end to the other.
+    back = (_norm(p - a) < _norm(b - q))[:, None]
+    a, b, p, q = np.where(back, b, a), np.where(back, a, b), np.where(back, q, p), np.where(back, p, q)
+    in_length, out_length = _norm(p - a), _norm(b - q)
+    n = _radial(p, cylinder) / _norm(_radial(p, cylinder))[:, None]
+    e = (p - a) / in_length[:, None]
+    corner = np.abs(_dot(e, n))
+    t = e - _dot(e, n)[:, None] * n
+    t /= _norm(t)[:, None]
+    arc, angle, end, t_end = (_walk_cylinder if cylinder else _walk_sphere)(radius, p, n, t, q)
+    miss = _norm(end - q)
+    reach = 1e-15 * np.maximum(_norm(a), _norm(b)) / np.maximum(out_length, 1e-300)
+    out = np.where(
+        out_length > 0.0, _norm((b - q) - out_length[:, None] * t_end) / np.maximum(out_length, 1e-300), 0.0
+    )
+    off = np.maximum(
+        np.abs(_norm(_radial(p, cylinder)) - radius), np.abs(_norm(_radial(q, cylinder)) - radius)
+    )
+    straight_turn = np.where(
+        out_length > 0.0, _norm(e - (b - q) / np.maximum(out_length, 1e-300)[:, None]), 0.0
+    )
+    reach_a, reach_b = _norm(_radial(p - a, cylinder)), _norm(_radial(b - q, cylinder))
+    swept = np.arctan(reach_a / radius) + np.abs(angle) + np.arctan(reach_b / radius)
+
+    fault, measure = np.zeros(len(a)), np.zeros(len(a))
+    for here, name, size in (  # the last that holds is the one that is told
+        (np.full(len(a), not cylinder) & (swept > np.pi + ANGLE), Fault.LONG_WAY, swept),
+        (out > ANGLE + 10.0 * reach, Fault.CORNER, out),
+        (miss > ANGLE * radius, Fault.NOT_GEODESIC, miss),
+        (corner > ANGLE + 10.0 * reach, Fault.CORNER, corner),
+        (off > ANGLE * radius, Fault.OFF_SURFACE, off),
+        ((_norm(p - q) < ANGLE * radius) & (straight_turn > 1e-6), Fault.INSIDE, straight_turn),
+    ):
+        fault, measure = np.where(here, name, fault), np.where(here, size, measure)
+    turn = np.where(np.signbit(angle) ^ back[:, 0], -swept, swept) if cylinder else np.zeros(len(a))
+    return fault, measure, arc, turn
+
+
+def _once_round(angle: Array) -> Array:
+    """Return the angle in [0, 2π), but rounding just below zero as zero."""
+    angle = np.mod(angle, 2.0 * np.pi)
+    return np.where(angle > 2.0 * np.pi - 1e-9, 0.0, angle)
+
+
+def _walk_sphere(radius: float, p: Array, n: Array, t: Array, q: Array) -> tuple[Array, Array, Array, Array]:
+    """Follow the great circle from p along t until it is nearest to q: arc, angle, end, tangent there."""
+    angle = _once_round(np.arctan2(_dot(q, t), _dot(q, n)))
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return radius * angle, angle, radius * (cos * n + sin * t), cos * t - sin * n
+
+
+def _walk_cylinder(
+    radius: float, p: Array, n: Array, t: Array, q: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Follow the helix from p along t as far round as q: arc, angle (signed), end, tangent there."""
+    round_p = np.stack([-n[:, 1], n[:, 0], np.zeros(len(p))], axis=1)  # unit, counter-clockwise about z
+    along = _dot(t, round_p)
+    sense = np.where(along >= 0.0, 1.0, -1.0)
+    angle = _once_round(sense * (np.arctan2(q[:, 1], q[:, 0]) - np.arctan2(p[:, 1], p[:, 0])))
+    level = np.abs(along) < 1e-12  # parallel to the axis: a straight line on the surface
+    arc = np.where(level, np.abs(q[:, 2] - p[:, 2]), radius * angle / np.where(level, 1.0, np.abs(along)))
+    cos, sin = np.cos(sense * angle), np.sin(sense * angle)
+    turned = np.stack([cos * n[:, 0] - sin * n[:, 1], sin * n[:, 0] + cos * n[:, 1]], axis=1)
+    end = np.column_stack([radius * turned, p[:, 2] + arc * t[:, 2]])
+    t_end = np.column_stack([-along * turned[:, 1], along * turned[:, 0], t[:, 2]])
+    return arc, np.copysign(angle, sense), end, t_end
+
+
+def closed_form_length(cylinder: bool, radius: float, a: Array, b: Array, side: int = 1) -> Array:
+    """Return the length (T,) of the shortest string from a to b that passes the axis on the given side [m].
+
+    side: +1 with the axis on the left of travel, -1 on the right; a sphere has only one minimum. nan where an end
+    point lies inside. Tangents and one arc in closed form (obstacle-set method, Garner & Pandy 2000).
+    """
+    ra, rb = _norm(_radial(a, cylinder)), _norm(_radial(b, cylinder))
+    with np.errstate(invalid="ignore"):
+        if cylinder:
+            between = np.mod(
+                side * (np.arctan2(b[:, 1], b[:, 0]) - np.arctan2(a[:, 1], a[:, 0])), 2.0 * np.pi
+            )
+        else:
+            between = np.arctan2(_norm(np.cross(a, b)), _dot(a, b))
+        arc = between - np.arccos(radius / ra) - np.arccos(radius / rb)
+        plane = np.sqrt(ra**2 - radius**2) + np.sqrt(rb**2 - radius**2) + radius * arc
+        height = b[:, 2] - a[:, 2] if cylinder else 0.0
+        wrapped = np.hypot(plane, height)
+    return np.where(arc < 0.0, _norm(b - a), wrapped)

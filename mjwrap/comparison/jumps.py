@@ -1,0 +1,169 @@
+"""Jumps of length or slope along a sweep: told from a steep stretch by halving the step until only a jump is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.poses import Motion, PoseMaker
+from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
+from mjwrap.comparison.verdict import slope
+
+Array = NDArray[np.float64]
+Probe = Callable[[float], tuple[float, float]]  # place in the sweep -> length, slope
+
+LENGTH = 1e-6  # [m] smallest jump in length that is told
+SLOPE = 1e-5  # [m/rad] smallest jump in slope that is told
+NARROW = 1e-9  # of the sweep's range: the width at which a jump is told from a steep stretch
+LASTING = 0.5  # a jump keeps this share of its size while the width shrinks a thousandfold
+MOST = 3  # intervals looked into, for each muscle, sweep and kind
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump of one program's path: where, by how much [m, m/rad], and what the path was before and after."""
+
+    program: str
+    muscle: str
+    sweep: str
+    at: float
+    length: float
+    slope: float
+    before: str
+    after: str
+
+
+def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, axis: int = 0) -> list[Jump]:
+    """Return the jumps of both programs along a sweep of one joint that has been evaluated."""
+    motion, place = batch.motion, poses.maker(joint, axis)
+    found: list[Jump] = []
+    for twin in batch.twins:
+        for program, record in (("MuJoCo", twin.native), ("mjwrap", twin.mjwrap)):
+            if record is None:
+                continue
+            good = np.ones(len(motion.at), dtype=np.bool_) if program == "MuJoCo" else twin.status == 0
+            seen: list[float] = []
+            for k in _candidates(motion, record, good):
+                probe = (
+                    _native_probe(comparer, twin, place)
+                    if program == "MuJoCo"
+                    else _mjwrap_probe(comparer, twin, place, motion, k, poses.base)
+                )
+                jump = _refine(probe, float(motion.at[k]), float(motion.at[k + 1]), float(np.ptp(motion.at)))
+                if jump is None or any(abs(jump[0] - other) < 1e-6 for other in seen):
+                    continue
+                seen.append(jump[0])
+                before, after = _sides(comparer, twin, program, place, jump[0], float(np.ptp(motion.at)))
+                found.append(Jump(program, twin.name, motion.name, *jump, before, after))
+    return found
+
+
+def _candidates(motion: Motion, record: PathRecord, good: NDArray[np.bool_]) -> list[int]:
+    """Return the intervals in which length or slope change as a smooth curve would not."""
+    h, m, l = np.diff(motion.at), slope(record, motion), record.length
+    whole = good[1:] & good[:-1]
+    rest = np.where(whole, np.abs(np.diff(l) - 0.5 * h * (m[1:] + m[:-1])), 0.0)
+    turn = np.where(whole, np.abs(np.diff(m)), 0.0)
+    beside = np.maximum(np.append(turn[1:], 0.0), np.insert(turn[:-1], 0, 0.0))
+    lengths = [k for k in np.argsort(-rest)[:MOST] if rest[k] > 0.5 * LENGTH]
+    slopes = [k for k in np.argsort(-turn)[:MOST] if turn[k] > 2.0 * beside[k] + SLOPE]
+    return sorted({int(k) for k in (*lengths, *slopes)})
+
+
+def _refine(probe: Probe, low: float, high: float, span: float) -> tuple[float, float, float] | None:
+    """Halve an interval towards its jump; return (place, jump in length, jump in slope), or None if it is smooth."""
+    (l0, m0), (l1, m1) = probe(low), probe(high)
+    wide: tuple[float, float] | None = None
+    while high - low > NARROW * span:
+        middle = 0.5 * (low + high)
+        lm, mm = probe(middle)
+        h = middle - low
+        left = abs(lm - l0 - 0.5 * h * (m0 + mm)) / LENGTH + abs(mm - m0) / SLOPE
+        right = abs(l1 - lm - 0.5 * h * (mm + m1)) / LENGTH + abs(m1 - mm) / SLOPE
+        if left >= right:
+            high, l1, m1 = middle, lm, mm
+        else:
+            low, l0, m0 = middle, lm, mm
+        if abs(l1 - l0) < LENGTH and abs(m1 - m0) < SLOPE:
+            return None
+        if wide is None and high - low < 1e3 * NARROW * span:
+            wide = abs(l1 - l0), abs(m1 - m0)
+    assert wide is not None
+    length = l1 - l0 if abs(l1 - l0) >= max(LENGTH, LASTING * wide[0]) else 0.0
+    turn = m1 - m0 if abs(m1 - m0) >= max(SLOPE, LASTING * wide[1]) else 0.0
+    return (0.5 * (low + high), length, turn) if length or turn else None
+
+
+def _native_probe(comparer: Comparer, twin: Twin, place: Callable[[float], tuple[Array, Array]]) -> Probe:
+    def probe(at: float) -> tuple[float, float]:
+        qpos, tangent = place(at)
+        length, _, jacobian = comparer.native_at(qpos, np.zeros_like(tangent))
+        return float(length[twin.tendon]), float(jacobian[twin.tendon] @ tangent)
+
+    return probe
+
+
+def _mjwrap_probe(
+    comparer: Comparer,
+    twin: Twin,
+    place: Callable[[float], tuple[Array, Array]],
+    motion: Motion,
+    k: int,
+    base: Array,
+) -> Probe:
+    """Return a probe that comes to every place from sample k, on the branch that the sweep had there."""
+    assert twin.mjwrap is not None
+    still = np.zeros(motion.tangent.shape[1])
+    comparer.muscles.reset(comparer.data)
+    cold = comparer.mjwrap_at(motion.qpos[k], still)[0][twin.index]
+    same_branch = abs(cold - twin.mjwrap.length[k]) < 1e-9
+
+    def probe(at: float) -> tuple[float, float]:
+        comparer.muscles.reset(comparer.data)
+        if same_branch:
+            comparer.mjwrap_at(motion.qpos[k], still)
+        else:
+            comparer.walk(base, motion.qpos[0])
+            for qpos in motion.qpos[: k + 1]:
+                comparer.mjwrap_at(qpos, still)
+        qpos, tangent = place(at)
+        length, _, jacobian, _ = comparer.mjwrap_at(qpos, still)
+        return float(length[twin.index]), float(jacobian[twin.index] @ tangent)
+
+    return probe
+
+
+def _sides(
+    comparer: Comparer,
+    twin: Twin,
+    program: str,
+    place: Callable[[float], tuple[Array, Array]],
+    at: float,
+    span: float,
+) -> tuple[str, str]:
+    """Say what the path was on either side of a jump."""
+    ends = [place(at - 2.0 * NARROW * span), place(at + 2.0 * NARROW * span)]
+    qpos, tangent = (np.array(part) for part in zip(*ends, strict=True))
+    motion = Motion("", np.arange(2.0), qpos, tangent, np.zeros_like(tangent), False)
+    for again in comparer.evaluate(motion).twins:
+        if again.name == twin.name:
+            record = again.native if program == "MuJoCo" else again.mjwrap
+            if record is not None:
+                return _words(record, 0), _words(record, 1)
+    return "", ""
+
+
+def _words(record: PathRecord, k: int) -> str:
+    """Say what a path is at pose k: which surfaces it touches, and whether it is a true geodesic."""
+    touched = int(record.touched[k].sum())
+    text = f"{touched} surface{'s' * (touched != 1)} touched" if touched else "straight"
+    if record.fault[k]:
+        return f"{text}, {Fault(int(record.fault[k])).words.format(record.measure[k])}"
+    turns = [
+        f"{turn:+.2f}" for turn, on in zip(record.turns[k], record.touched[k], strict=True) if on and turn
+    ]
+    return text + (f", {' '.join(turns)} rad about the axis" if turns else "")

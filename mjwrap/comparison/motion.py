@@ -1,0 +1,148 @@
+"""Forward dynamics of a model twice, along MuJoCo's tendons and along mjwrap's paths, with the same controls."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import MjwrapError
+from mjwrap.excitation import Excitation
+from mjwrap.mjcf import name_of
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+_UNSTABLE = (
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+)
+
+
+@dataclass
+class MotionDifference:
+    """Both runs: time (T,), qpos (T, nq) of each, and their difference (T, nv), mjwrap minus MuJoCo, by dof names.
+
+    stopped: why a run ended early, or empty.
+    """
+
+    time: Array
+    native: Array
+    mjwrap: Array
+    difference: Array
+    dofs: list[str]
+    stopped: str = ""
+
+    def worst(self) -> tuple[str, float, float]:
+        """Return the dof that differs most, by how much [m or rad], and when [s]."""
+        if not self.difference.size:
+            return "", 0.0, 0.0
+        t, d = np.unravel_index(int(np.argmax(np.abs(self.difference))), self.difference.shape)
+        return self.dofs[int(d)], float(self.difference[t, d]), float(self.time[t])
+
+    def final(self) -> tuple[str, float]:
+        """Return the dof that differs most at the end, and by how much [m or rad]."""
+        if not self.difference.size:
+            return "", 0.0
+        d = int(np.argmax(np.abs(self.difference[-1])))
+        return self.dofs[d], float(self.difference[-1, d])
+
+
+def unstable(data: mujoco.MjData) -> bool:
+    """Return whether MuJoCo found the state bad and reset it, which it does without an exception."""
+    return any(int(data.warning[kind].number) for kind in _UNSTABLE)
+
+
+def with_native_laws(model: mujoco.MjModel) -> tuple[mujoco.MjModel, list[str]]:
+    """Return a copy whose muscles all have MuJoCo's own curves, and the names of those that had another law.
+
+    So both runs differ by the path alone. Muscles whose actuator has no muscle curves keep their law.
+    """
+    model = copy.copy(model)
+    dropped = (int(mujoco.mjtObj.mjOBJ_NUMERIC), int(mujoco.mjtObj.mjOBJ_TEXT))
+    changed: list[str] = []
+    for i in range(model.ntuple):
+        rows = range(int(model.tuple_adr[i]), int(model.tuple_adr[i]) + int(model.tuple_size[i]))
+        actuators = [
+            int(model.tuple_objid[r])
+            for r in rows
+            if int(model.tuple_objtype[r]) == int(mujoco.mjtObj.mjOBJ_ACTUATOR)
+        ]
+        if "mjwrap" not in name_of(model, mujoco.mjtObj.mjOBJ_TUPLE, i) or not actuators:
+            continue
+        if int(model.actuator_gaintype[actuators[0]]) != int(mujoco.mjtGain.mjGAIN_MUSCLE):
+            continue
+        kept = [r for r in rows if int(model.tuple_objtype[r]) not in dropped]
+        if len(kept) == len(rows):
+            continue
+        for field in (model.tuple_objtype, model.tuple_objid, model.tuple_objprm):
+            field[rows[0] : rows[0] + len(kept)] = field[kept]
+        model.tuple_size[i] = len(kept)
+        changed.append(name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuators[0]))
+    return model, changed
+
+
+def compare_motion(
+    model: mujoco.MjModel,
+    entries: Sequence[str],
+    duration: float,
+    *,
+    key: int = -1,
+    qpos: Array | None = None,
+    seed: int = 0,
+    progress: Callable[[int], object] | None = None,
+) -> MotionDifference:
+    """Run both for `duration` [s] from the same state; entries: what `Excitation` takes.
+
+    key: a keyframe to start from, or -1; qpos (nq,): a start position instead. progress is called after every step.
+    """
+    native_model, driven_model = copy.copy(model), copy.copy(model)
+    muscles = MuscleSystem(driven_model)
+    excitation = Excitation(muscles, entries, seed)
+    native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
+    for each, data in ((native_model, native), (driven_model, driven)):
+        if key >= 0:
+            mujoco.mj_resetDataKeyframe(each, data, key)
+        if qpos is not None:
+            data.qpos[:] = qpos
+    times, theirs, ours, stopped = [0.0], [native.qpos.copy()], [driven.qpos.copy()], ""
+    for _ in range(round(duration / float(model.opt.timestep))):
+        excitation.write(native, own=False)
+        excitation.write(driven)
+        mujoco.mj_step(native_model, native)
+        try:
+            if unstable(native):
+                stopped = f"MuJoCo's own run became unstable at {times[-1]:g} s"
+            muscles.step(driven)
+        except MjwrapError as error:
+            stopped = f"{stopped}; " * bool(stopped) + f"mjwrap's run stopped: {error}"
+        if stopped:
+            break
+        times.append(float(native.time))
+        theirs.append(native.qpos.copy())
+        ours.append(driven.qpos.copy())
+        if progress is not None:
+            progress(1)
+    gap = np.zeros((len(times), model.nv))
+    for row, a, b in zip(gap, theirs, ours, strict=True):
+        mujoco.mj_differentiatePos(model, row, 1.0, a, b)
+    return MotionDifference(np.array(times), np.array(theirs), np.array(ours), gap, dof_names(model), stopped)
+
+
+def dof_names(model: mujoco.MjModel) -> list[str]:
+    """Return a name for every degree of freedom: its joint's, with a number where the joint has several."""
+    found = []
+    for d in range(model.nv):
+        joint = int(model.dof_jntid[d])
+        name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+        first = int(model.jnt_dofadr[joint])
+        several = int(model.jnt_type[joint]) in (
+            int(mujoco.mjtJoint.mjJNT_FREE),
+            int(mujoco.mjtJoint.mjJNT_BALL),
+        )
+        found.append(f"{name}[{d - first}]" if several else name)
+    return found

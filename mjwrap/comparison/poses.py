@@ -1,0 +1,155 @@
+"""Poses to compare at: sweeps of every joint over its range, and random ones; joints that are coupled follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.mjcf import name_of
+
+Array = NDArray[np.float64]
+_KINDS = mujoco.mjtJoint
+_HINGE, _SLIDE, _BALL = int(_KINDS.mjJNT_HINGE), int(_KINDS.mjJNT_SLIDE), int(_KINDS.mjJNT_BALL)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses to evaluate in order.
+
+    name: a joint's, or "random poses"; at (T,): the joint's position [m or rad], or a running number; qpos (T, nq);
+    tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether one pose leads to the next.
+    """
+
+    name: str
+    at: Array
+    qpos: Array
+    tangent: Array
+    qvel: Array
+    continuous: bool
+
+
+class PoseMaker:
+    """Makes poses of a model around a base pose qpos (nq,)."""
+
+    def __init__(self, model: mujoco.MjModel, base: Array, seed: int = 0) -> None:
+        self.model = model
+        self.base = np.array(base, dtype=np.float64)
+        self.rng = np.random.default_rng(seed)
+        self._couplings = self._read_couplings()
+
+    def _read_couplings(self) -> list[tuple[int, int, Array]]:
+        """Return (joint, the joint that it follows, coefficients) of the active joint equalities."""
+        model = self.model
+        return [
+            (int(model.eq_obj1id[i]), int(model.eq_obj2id[i]), model.eq_data[i, :5].copy())
+            for i in range(model.neq)
+            if int(model.eq_type[i]) == int(mujoco.mjtEq.mjEQ_JOINT)
+            and model.eq_active0[i]
+            and int(model.eq_obj2id[i]) >= 0
+        ]
+
+    def joints(self) -> list[int]:
+        """Return the joints that can be swept: all but free ones."""
+        return [j for j in range(self.model.njnt) if int(self.model.jnt_type[j]) in (_HINGE, _SLIDE, _BALL)]
+
+    def axes(self, joint: int) -> range:
+        """Return the axes to sweep a joint about: three for a ball."""
+        return range(3 if int(self.model.jnt_type[joint]) == _BALL else 1)
+
+    def middle(self) -> Array:
+        """Return the pose (nq,) with every hinge and slide in the middle of its range."""
+        qpos = self.base.copy()
+        for joint in self.joints():
+            if int(self.model.jnt_type[joint]) != _BALL:
+                qpos[self.model.jnt_qposadr[joint]] = 0.5 * sum(self.span(joint))
+        self._follow(qpos, np.zeros(self.model.nv), -1)
+        return qpos
+
+    def span(self, joint: int) -> tuple[float, float]:
+        """Return the range to sweep [m or rad]: the joint's own, else half a turn or half the model's extent."""
+        model = self.model
+        kind = int(model.jnt_type[joint])
+        low, high = (float(x) for x in model.jnt_range[joint])
+        if kind == _BALL:
+            reach = high if model.jnt_limited[joint] else 0.5 * np.pi
+            return -reach, reach
+        if model.jnt_limited[joint] and high > low:
+            return low, high
+        here = float(self.base[model.jnt_qposadr[joint]])
+        reach = np.pi if kind == _HINGE else 0.5 * float(model.stat.extent)
+        return here - reach, here + reach
+
+    def place(self, joint: int, axis: int, value: float) -> tuple[Array, Array]:
+        """Return the base pose (nq,) with one joint at `value`, about `axis` for a ball, and d(pose)/d(value) (nv,)."""
+        model = self.model
+        qpos, tangent = self.base.copy(), np.zeros(model.nv)
+        adr, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        if int(model.jnt_type[joint]) == _BALL:
+            turn = np.zeros(3)
+            turn[axis] = value
+            mujoco.mju_quatIntegrate(qpos[adr : adr + 4], turn, 1.0)
+            tangent[dof + axis] = 1.0
+        else:
+            qpos[adr] = value
+            tangent[dof] = 1.0
+        self._follow(qpos, tangent, joint)
+        return qpos, tangent
+
+    def _follow(self, qpos: Array, tangent: Array, swept: int) -> None:
+        """Put coupled joints where their polynomials want them; the swept joint stays."""
+        model = self.model
+        for _ in range(2):  # a follower may lead another
+            for joint, leader, c in self._couplings:
+                if joint == swept:
+                    continue
+                adr, leader_adr = int(model.jnt_qposadr[joint]), int(model.jnt_qposadr[leader])
+                x = qpos[leader_adr] - model.qpos0[leader_adr]
+                qpos[adr] = model.qpos0[adr] + float(np.polynomial.polynomial.polyval(x, c))
+                slope = float(np.polynomial.polynomial.polyval(x, c[1:] * np.arange(1, 5)))
+                tangent[model.jnt_dofadr[joint]] = slope * tangent[model.jnt_dofadr[leader]]
+
+    def _velocities(self, count: int) -> Array:
+        return self.rng.uniform(-1.0, 1.0, (count, self.model.nv))
+
+    def sweep(self, joint: int, samples: int, axis: int = 0) -> Motion:
+        """Return a sweep of one joint over its range; the others stay, or follow where they are coupled to it."""
+        low, high = self.span(joint)
+        at = np.linspace(low, high, samples)
+        pairs = [self.place(joint, axis, float(value)) for value in at]
+        name = name_of(self.model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+        if int(self.model.jnt_type[joint]) == _BALL:
+            name = f"{name} ({'xyz'[axis]})"
+        qpos, tangent = (np.array(part) for part in zip(*pairs, strict=True))
+        return Motion(name, at, qpos, tangent, self._velocities(samples), True)
+
+    def maker(self, joint: int, axis: int = 0) -> Callable[[float], tuple[Array, Array]]:
+        """Return the function value -> (pose, tangent) of a sweep, for a closer look between its samples."""
+        return lambda value: self.place(joint, axis, value)
+
+    def random(self, count: int) -> Motion:
+        """Return poses with every joint drawn from its range, on its own; free joints stay at the base pose."""
+        model = self.model
+        qpos = np.tile(self.base, (count, 1))
+        for row in qpos:
+            for joint in self.joints():
+                adr = int(model.jnt_qposadr[joint])
+                low, high = self.span(joint)
+                if int(model.jnt_type[joint]) == _BALL:
+                    direction = self.rng.normal(size=3)
+                    turn = direction / np.linalg.norm(direction) * self.rng.uniform(0.0, high)
+                    mujoco.mju_quatIntegrate(row[adr : adr + 4], turn, 1.0)
+                else:
+                    row[adr] = self.rng.uniform(low, high)
+            self._follow(row, np.zeros(model.nv), -1)
+        return Motion(
+            "random poses",
+            np.arange(count, dtype=np.float64),
+            qpos,
+            np.zeros((count, model.nv)),
+            self._velocities(count),
+            False,
+        )

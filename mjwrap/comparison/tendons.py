@@ -1,0 +1,132 @@
+"""What MuJoCo's tendons did at a pose: their routes, and the points of the path that they took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.mjcf import MuscleDeclaration
+
+Array = NDArray[np.float64]
+_SITE, _PULLEY = int(mujoco.mjtWrap.mjWRAP_SITE), int(mujoco.mjtWrap.mjWRAP_PULLEY)
+_PULLEY_MARK = -2  # in wrap_obj; sites are -1, geoms their id
+_SURFACES = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CYLINDER))
+
+
+class Span(NamedTuple):
+    """A part of a tendon from one site to the next: over a geom (-1: none), counted with a weight (pulleys)."""
+
+    start: int
+    end: int
+    geom: int
+    hint: int
+    weight: float
+
+
+def tendon_spans(model: mujoco.MjModel, tendon: int) -> list[Span]:
+    """Return the spans of a spatial tendon in order."""
+    spans: list[Span] = []
+    last, geom, hint, weight = -1, -1, -1, 1.0
+    first = int(model.tendon_adr[tendon])
+    for w in range(first, first + int(model.tendon_num[tendon])):
+        kind, index, parameter = int(model.wrap_type[w]), int(model.wrap_objid[w]), float(model.wrap_prm[w])
+        if kind == _PULLEY:
+            last, geom, hint, weight = -1, -1, -1, 1.0 / parameter
+        elif kind in _SURFACES:
+            geom, hint = index, round(parameter) if parameter >= 0.0 else -1
+        elif kind == _SITE:
+            if last >= 0:
+                spans.append(Span(last, index, geom, hint, weight))
+            last, geom, hint = index, -1, -1
+    return spans
+
+
+def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
+    """Return the spans of a declared muscle, or None where it has several geoms between two sites."""
+    spans: list[Span] = []
+    for route in muscle.routes:
+        last, geom, hint = route.origin, -1, -1
+        for node in route.nodes:
+            if node.geom >= 0:
+                if geom >= 0:
+                    return None
+                geom, hint = node.geom, node.hint_site
+            else:
+                spans.append(Span(last, node.site, geom, hint, route.weight))
+                last, geom, hint = node.site, -1, -1
+        spans.append(Span(last, route.insertion, geom, hint, route.weight))
+    return spans
+
+
+@dataclass
+class SpanPoints:
+    """Where one span's path ran, pose by pose: a to b (T, 3), over p and q (T, 3) where touched (T,). World [m]."""
+
+    a: Array
+    b: Array
+    touched: NDArray[np.bool_]
+    p: Array
+    q: Array
+
+    @classmethod
+    def empty(cls, count: int) -> SpanPoints:
+        """Return room for `count` poses."""
+        a, b, p, q = (np.zeros((count, 3)) for _ in range(4))
+        return cls(a, b, np.zeros(count, dtype=np.bool_), p, q)
+
+
+class WrapRecord:
+    """The points of all tendons over a motion, as MuJoCo left them in wrap_obj and wrap_xpos."""
+
+    def __init__(self, model: mujoco.MjModel, count: int) -> None:
+        self.model = model
+        self.adr = np.zeros((count, model.ntendon), dtype=np.int64)
+        self.num = np.zeros((count, model.ntendon), dtype=np.int64)
+        self.obj = np.zeros((count, 2 * model.nwrap), dtype=np.int64)
+        self.pos = np.zeros((count, 2 * model.nwrap, 3))
+
+    def keep(self, k: int, data: mujoco.MjData) -> None:
+        """Keep the points of pose k."""
+        self.adr[k], self.num[k] = data.ten_wrapadr, data.ten_wrapnum
+        self.obj[k], self.pos[k] = data.wrap_obj.reshape(-1), data.wrap_xpos.reshape(-1, 3)
+
+    def spans(self, tendon: int) -> list[SpanPoints]:
+        """Return the points of a tendon's spans at all kept poses."""
+        spans = tendon_spans(self.model, tendon)
+        found = [SpanPoints.empty(len(self.obj)) for _ in spans]
+        width = int(self.num[:, tendon].max(initial=0))
+        index = self.adr[:, tendon, None] + np.arange(width)
+        inside = np.arange(width) < self.num[:, tendon, None]
+        rows = np.where(
+            inside, np.take_along_axis(self.obj, np.minimum(index, self.obj.shape[1] - 1), axis=1), -9
+        )
+        patterns, group = np.unique(rows, axis=0, return_inverse=True)
+        for g, pattern in enumerate(patterns):
+            poses = np.flatnonzero(group.reshape(-1) == g)
+            for span, place in zip(found, _places(spans, pattern), strict=True):
+                a, p, q, b = (self.pos[poses, self.adr[poses, tendon] + column] for column in place)
+                span.a[poses], span.b[poses], span.p[poses], span.q[poses] = a, b, p, q
+                span.touched[poses] = place[1] != place[0]
+        return found
+
+
+def _places(spans: list[Span], pattern: NDArray[np.int64]) -> list[tuple[int, int, int, int]]:
+    """Return for every span the columns of a, p, q, b in a row of wrap_obj; p = q = a where nothing is touched."""
+    places: list[tuple[int, int, int, int]] = []
+    column = 0
+    for span in spans:
+        if places and column + 1 < len(pattern) and pattern[column + 1] == _PULLEY_MARK:
+            column += 1
+        if pattern[column] == _PULLEY_MARK:
+            column += 1
+        if span.geom >= 0 and pattern[column + 1] == span.geom:
+            places.append((column, column + 1, column + 2, column + 3))
+            column += 3
+        else:
+            places.append((column, column, column, column + 1))
+            column += 1
+    return places

@@ -1,0 +1,283 @@
+"""The same poses in MuJoCo's tendons and in mjwrap: lengths, velocities, moment arms, and each path judged."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.comparison.geometry import Fault, judge
+from mjwrap.comparison.poses import Motion
+from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+LENGTH = 1e-9  # [m] largest difference of a path's length from the sum of its own parts
+
+
+@dataclass
+class PathRecord:
+    """One program's path of one muscle over a motion, (T,) each, and its judgement.
+
+    length [m], velocity [m/s], jacobian (T, nv) ∂l/∂q; fault: `Fault` of the worst span, measure, span: which one;
+    turns (T, spans) [rad]: the branch, see `geometry.Judgement`; touched (T, spans).
+    """
+
+    length: Array
+    velocity: Array
+    jacobian: Array
+    fault: Ints
+    measure: Array
+    span: Ints
+    turns: Array
+    touched: NDArray[np.bool_]
+
+
+class _Pair(NamedTuple):
+    """A muscle to compare: name, index in the MuscleSystem or -1, tendon, spans."""
+
+    name: str
+    index: int
+    tendon: int
+    spans: list[Span]
+
+
+@dataclass
+class Twin:
+    """One muscle in both programs over a motion.
+
+    index: in the `MuscleSystem`; status (T,): mjwrap's. A muscle that stays native has index -1 and no mjwrap.
+    """
+
+    name: str
+    index: int
+    tendon: int
+    spans: list[Span]
+    native: PathRecord
+    mjwrap: PathRecord | None
+    status: Ints
+
+
+@dataclass
+class Batch:
+    """All compared muscles over one motion."""
+
+    motion: Motion
+    twins: list[Twin] = field(default_factory=list)
+
+
+class Comparer:
+    """Evaluates motions with both programs.
+
+    muscles: a `MuscleSystem`; wanted: names of the muscles to compare, those that stay native among them. Those whose
+    mjwrap route is not that of their tendon, and those without a spatial tendon, are left out and named in `left_out`
+    with the reason.
+    """
+
+    def __init__(self, muscles: MuscleSystem, wanted: Sequence[str]) -> None:
+        self.muscles, self.model = muscles, muscles.model
+        # Native kinematics need no contacts and no forces; a copy keeps the caller's options as they are.
+        self._native = copy.copy(self.model)
+        off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self._native.opt.disableflags |= int(off)
+        self._native_data = mujoco.MjData(self._native)
+        self.data = mujoco.MjData(self.model)
+        self.left_out: dict[str, str] = {}
+        self._pairs: list[_Pair] = []
+        for name in wanted:
+            found = self._pair(name)
+            if isinstance(found, str):
+                self.left_out[name] = found
+            else:
+                self._pairs.append(found)
+
+    def _pair(self, name: str) -> _Pair | str:
+        """Return what to compare for a muscle, or why nothing can be."""
+        model = self.model
+        if name in self.muscles.names:
+            index = self.muscles.index(name)
+            declared = self.muscles.declarations[index]
+            if declared.tendon < 0:
+                return "it has no tendon in MuJoCo"
+            own = muscle_spans(declared)
+            if own is None or own != tendon_spans(model, declared.tendon):
+                return "its tendon is a placeholder: mjwrap's route is another one"
+            return _Pair(name, index, declared.tendon, own)
+        actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+        if actuator < 0 or int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
+            return "it has no spatial tendon"
+        tendon = int(model.actuator_trnid[actuator, 0])
+        spans = tendon_spans(model, tendon)
+        return _Pair(name, -1, tendon, spans) if spans else "it has no spatial tendon"
+
+    def evaluate(self, motion: Motion, start: Array | None = None) -> Batch:
+        """Evaluate all poses of a motion; start (nq,): where a continuous one comes from, with its branch."""
+        count, nv = len(motion.at), self.model.nv
+        native, mine = _Numbers(count, self.model.ntendon, nv), _Numbers(count, self.muscles.n, nv)
+        wraps = WrapRecord(self.model, count)
+        contacts: list[dict[int, Array]] = []
+        geoms = np.zeros((count, self.model.ngeom, 3)), np.zeros((count, self.model.ngeom, 3, 3))
+        taken = [pair.index for pair in self._pairs if pair.index >= 0]
+        self.muscles.reset(self.data)
+        if motion.continuous and start is not None:
+            self.walk(start, motion.qpos[0])
+        for k in range(count):
+            native.keep(k, *self.native_at(motion.qpos[k], motion.qvel[k]))
+            wraps.keep(k, self._native_data)
+            geoms[0][k], geoms[1][k] = (
+                self._native_data.geom_xpos,
+                self._native_data.geom_xmat.reshape(-1, 3, 3),
+            )
+            if not motion.continuous:
+                self.muscles.reset(self.data)
+            mine.keep(k, *self.mjwrap_at(motion.qpos[k], motion.qvel[k]))
+            contacts.append({i: self.muscles.contact_points(i) for i in taken})
+        batch = Batch(motion)
+        for name, index, tendon, spans in self._pairs:
+            points = wraps.spans(tendon)
+            record = self._record(spans, points, geoms, *native.of(tendon))
+            own_record, status = None, np.zeros(count, dtype=np.int64)
+            if index >= 0:
+                own = [_own_points(at) for at in points]
+                _assign(spans, own, [contact[index] for contact in contacts], self.model, geoms)
+                own_record, status = self._record(spans, own, geoms, *mine.of(index)), mine.status[:, index]
+            batch.twins.append(Twin(name, index, tendon, spans, record, own_record, status))
+        return batch
+
+    def walk(self, start: Array, goal: Array, steps: int = 20) -> None:
+        """Take mjwrap from one pose to another, so that it keeps its branch."""
+        difference = np.zeros(self.model.nv)
+        mujoco.mj_differentiatePos(self.model, difference, 1.0, start, goal)
+        for k in range(steps):
+            qpos = start.copy()
+            mujoco.mj_integratePos(self.model, qpos, difference, k / steps)
+            self.data.qpos[:] = qpos
+            self.muscles.forward(self.data)
+
+    def native_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array]:
+        """Return MuJoCo's tendon lengths (ntendon,), velocities and ten_J (ntendon, nv) at a state."""
+        model, data = self._native, self._native_data
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        rows = np.zeros((model.ntendon, model.nv))
+        counts, starts, columns = _sparse(model, data)
+        mujoco.mju_sparse2dense(rows, data.ten_J.reshape(-1), counts, starts, columns)
+        return data.ten_length.copy(), data.ten_velocity.copy(), rows
+
+    def mjwrap_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array, Ints]:
+        """Return mjwrap's lengths (n,), velocities, ∂l/∂q (n, nv) and status at a state, from where it stands."""
+        self.data.qpos[:], self.data.qvel[:] = qpos, qvel
+        jacobian = self.muscles.length_jacobian(self.data)
+        muscles = self.muscles
+        return muscles.length.copy(), muscles.velocity.copy(), jacobian, muscles.status.copy()
+
+    def _record(
+        self, spans: list[Span], points: list[SpanPoints], geoms: tuple[Array, Array],
+        length: Array, velocity: Array, jacobian: Array,
+    ) -> PathRecord:  # fmt: skip
+        count = len(length)
+        fault, measure, worst = np.zeros(count, dtype=np.int64), np.zeros(count), np.full(count, -1)
+        turns = np.zeros((count, len(spans)))
+        total = np.zeros(count)
+        for s, (span, at) in enumerate(zip(spans, points, strict=True)):
+            straight = np.where(
+                at.touched,
+                np.linalg.norm(at.p - at.a, axis=1) + np.linalg.norm(at.b - at.q, axis=1),
+                np.linalg.norm(at.b - at.a, axis=1),
+            )
+            arc = np.zeros(count)
+            if span.geom >= 0:
+                found = judge(*_in_frame(self.model, span.geom, geoms, at))
+                turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
+                new = (found.fault > 0) & (fault == 0)
+                fault[new], measure[new], worst[new] = found.fault[new], found.measure[new], s
+            total += span.weight * (straight + arc)
+        off = np.abs(total - length)
+        new = (fault == 0) & ~(off <= LENGTH)
+        fault[new], measure[new] = Fault.WRONG_LENGTH, off[new]
+        touched = np.stack([at.touched for at in points], axis=1)
+        return PathRecord(length, velocity, jacobian, fault, measure, worst, turns, touched)
+
+
+class _Numbers:
+    """Lengths, velocities, jacobians and status of `n` paths over `count` poses."""
+
+    def __init__(self, count: int, n: int, nv: int) -> None:
+        self.length, self.velocity = np.zeros((count, n)), np.zeros((count, n))
+        self.jacobian, self.status = np.zeros((count, n, nv)), np.zeros((count, n), dtype=np.int64)
+
+    def keep(self, k: int, length: Array, velocity: Array, jacobian: Array, status: Ints | int = 0) -> None:
+        self.length[k], self.velocity[k], self.jacobian[k], self.status[k] = (
+            length,
+            velocity,
+            jacobian,
+            status,
+        )
+
+    def of(self, i: int) -> tuple[Array, Array, Array]:
+        return self.length[:, i], self.velocity[:, i], self.jacobian[:, i]
+
+
+def _sparse(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.int32], ...]:
+    """Return row counts, row starts and columns of ten_J, which moved from data to model."""
+    home = model if hasattr(model, "ten_J_rownnz") else data
+    return home.ten_J_rownnz, home.ten_J_rowadr, home.ten_J_colind.reshape(-1)
+
+
+def _in_frame(
+    model: mujoco.MjModel, geom: int, geoms: tuple[Array, Array], at: SpanPoints
+) -> tuple[bool, float, Array, Array, NDArray[np.bool_], Array, Array]:
+    """Return what `judge` asks for: kind, radius, and the points in the geom's frame."""
+    centre, rotation = geoms[0][:, geom], geoms[1][:, geom]
+    a, b, p, q = (np.einsum("tji,tj->ti", rotation, x - centre) for x in (at.a, at.b, at.p, at.q))
+    cylinder = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+    return cylinder, float(model.geom_size[geom, 0]), a, b, at.touched, p, q
+
+
+def _own_points(native: SpanPoints) -> SpanPoints:
+    """Return a span of mjwrap's path with the same end points and no contact yet."""
+    own = SpanPoints.empty(len(native.a))
+    own.a, own.b = native.a, native.b
+    return own
+
+
+def _assign(
+    spans: list[Span],
+    own: list[SpanPoints],
+    pairs: list[Array],
+    model: mujoco.MjModel,
+    geoms: tuple[Array, Array],
+) -> None:
+    """Give every contact pair (k, 2, 3) of mjwrap to the span that it fits best, in order."""
+    for t, contacts in enumerate(pairs):
+        free = [s for s, span in enumerate(spans) if span.geom >= 0]
+        for pair in contacts:
+            s = min(free, key=lambda s: _misfit(spans[s], own[s], pair, model, geoms, t))
+            own[s].touched[t], own[s].p[t], own[s].q[t] = True, pair[0], pair[1]
+            free = [f for f in free if f > s]
+
+
+def _misfit(
+    span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geoms: tuple[Array, Array], t: int
+) -> float:
+    """Return how far two contact points are off a span's surface and tangents [m]."""
+    rotation, centre, radius = (
+        geoms[1][t, span.geom],
+        geoms[0][t, span.geom],
+        float(model.geom_size[span.geom, 0]),
+    )
+    misfit = 0.0
+    for point, end in ((pair[0], at.a[t]), (pair[1], at.b[t])):
+        local, away = rotation.T @ (point - centre), rotation.T @ (end - point)
+        if int(model.geom_type[span.geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+            local[2] = 0.0
+        distance = float(np.linalg.norm(local))
+        misfit = max(misfit, abs(distance - radius), abs(float(local @ away)) / max(distance, 1e-300))
+    return misfit

@@ -1,0 +1,215 @@
+"""Which of two paths is right, pose by pose, and in a sentence for each muscle."""
+
+from __future__ import annotations
+
+import enum
+from collections import Counter
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.poses import Motion
+from mjwrap.comparison.twins import PathRecord, Twin
+from mjwrap.mjcf import name_of
+from mjwrap.paths import Status
+
+Array = NDArray[np.float64]
+AGREE = 1e-9  # [m, m/s, m/rad] two true geodesics on one branch agree to this
+
+
+class Outcome(enum.IntEnum):
+    """What comparing one muscle at one pose showed."""
+
+    AGREE = 0  # both are the same true geodesic
+    OTHER_BRANCH = 1  # both are true geodesics, round the cylinder another way
+    MUJOCO_NOT_GEODESIC = 2  # mjwrap's path is a true geodesic, MuJoCo's is not
+    NO_PATH = 3  # mjwrap found none, and MuJoCo's is not a geodesic either
+    MJWRAP_FAILED = 4  # mjwrap found none where MuJoCo's path is a true geodesic
+    MJWRAP_WRONG = 5  # mjwrap's path is not a true geodesic
+    UNEXPLAINED = 6  # both are judged the same true geodesic, and their numbers differ
+
+
+MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED)
+
+
+def outcomes(twin: Twin) -> NDArray[np.int64]:
+    """Return the `Outcome` (T,) of a muscle that both programs have."""
+    native, mine = twin.native, twin.mjwrap
+    assert mine is not None
+    count = len(native.length)
+    same = (np.abs(native.turns - mine.turns) < 1e-3).all(axis=1)
+    near = differences(native, mine).max(axis=0) <= AGREE
+    found = np.full(count, Outcome.UNEXPLAINED, dtype=np.int64)
+    for here, outcome in (  # the last that holds counts
+        (near & same, Outcome.AGREE),
+        (~same, Outcome.OTHER_BRANCH),
+        (native.fault != 0, Outcome.MUJOCO_NOT_GEODESIC),
+        (mine.fault != 0, Outcome.MJWRAP_WRONG),
+        ((twin.status != 0) & (native.fault == 0), Outcome.MJWRAP_FAILED),
+        ((twin.status != 0) & (native.fault != 0), Outcome.NO_PATH),
+    ):
+        found[here] = outcome
+    return found
+
+
+def differences(native: PathRecord, mine: PathRecord) -> Array:
+    """Return (3, T): differences in length [m], velocity [m/s], largest moment arm [m/rad]."""
+    arm = np.abs(mine.jacobian - native.jacobian).max(axis=1, initial=0.0)
+    return np.array([np.abs(mine.length - native.length), np.abs(mine.velocity - native.velocity), arm])
+
+
+@dataclass
+class Extreme:
+    """The largest difference of one quantity, and where: motion, place in it, joint values, both programs' numbers."""
+
+    difference: float = 0.0
+    motion: str = ""
+    at: float = 0.0
+    joints: dict[str, float] = field(default_factory=dict)
+    native: float = 0.0
+    mjwrap: float = 0.0
+    dof: str = ""
+
+
+@dataclass
+class Curves:
+    """One sweep of one muscle, for a plot: at, and length and slope of both programs (T,)."""
+
+    motion: str
+    at: Array
+    native_length: Array
+    native_slope: Array
+    length: Array | None
+    slope: Array | None
+    failed: NDArray[np.bool_]
+
+
+@dataclass
+class MuscleSummary:
+    """What all poses showed of one muscle.
+
+    native_only: why it stays native, or empty; counts: poses by `Outcome` name; faults: MuJoCo's faults by (fault,
+    geom), with the largest measure; statuses: mjwrap's failures by message; agreement (3,): the largest differences at
+    poses where both are the same true geodesic; length, velocity, moment_arm: the largest differences of all.
+    """
+
+    name: str
+    native_only: str = ""
+    poses: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    faults: Counter[tuple[Fault, str]] = field(default_factory=Counter)
+    measures: dict[tuple[Fault, str], float] = field(default_factory=dict)
+    own_faults: Counter[str] = field(default_factory=Counter)
+    statuses: Counter[str] = field(default_factory=Counter)
+    agreement: Array = field(default_factory=lambda: np.zeros(3))
+    length: Extreme = field(default_factory=Extreme)
+    velocity: Extreme = field(default_factory=Extreme)
+    moment_arm: Extreme = field(default_factory=Extreme)
+    longer_branch: float = (
+        0.0  # mjwrap minus MuJoCo where they are on other branches, of the largest size [m]
+    )
+    curves: Curves | None = None
+    bad_poses: list[tuple[str, str, float, dict[str, float]]] = field(default_factory=list)
+
+    def add(self, model: mujoco.MjModel, motion: Motion, twin: Twin) -> None:
+        """Take in one motion."""
+        native, mine = twin.native, twin.mjwrap
+        self.poses += len(motion.at)
+        for k in np.flatnonzero(native.fault):
+            geom = _geom(model, twin, int(native.span[k]))
+            key = Fault(int(native.fault[k])), geom
+            self.faults[key] += 1
+            self.measures[key] = max(self.measures.get(key, 0.0), float(native.measure[k]))
+        if mine is None:
+            self._keep_curves(motion, twin, 0.0)
+            return
+        found = outcomes(twin)
+        self.counts.update(Outcome(int(o)).name for o in found)
+        self.statuses.update(Status(int(s)).message for s in twin.status[twin.status != 0])
+        wrong = found == Outcome.MJWRAP_WRONG
+        self.own_faults.update(
+            Fault(int(f)).words.format(m) for f, m in zip(mine.fault[wrong], mine.measure[wrong], strict=True)
+        )
+        for k in np.flatnonzero(np.isin(found, MJWRAP_AT_FAULT)):
+            place = (
+                Outcome(int(found[k])).name,
+                motion.name,
+                float(motion.at[k]),
+                _joints(model, motion.qpos[k]),
+            )
+            self.bad_poses.append(place)
+        gaps = differences(native, mine)
+        same = np.isin(found, (Outcome.AGREE, Outcome.UNEXPLAINED))
+        if same.any():
+            self.agreement = np.maximum(self.agreement, gaps[:, same].max(axis=1))
+        other = found == Outcome.OTHER_BRANCH
+        if other.any():
+            longer = (mine.length - native.length)[other]
+            most = float(longer[np.argmax(np.abs(longer))])
+            self.longer_branch = most if abs(most) > abs(self.longer_branch) else self.longer_branch
+        gaps = np.where(twin.status == 0, gaps, 0.0)
+        self._keep_extremes(model, motion, twin, gaps)
+        self._keep_curves(motion, twin, float(gaps[0].max(initial=0.0)))
+
+    def _keep_extremes(self, model: mujoco.MjModel, motion: Motion, twin: Twin, gaps: Array) -> None:
+        native, mine = twin.native, twin.mjwrap
+        assert mine is not None
+        for row, name in enumerate(("length", "velocity", "moment_arm")):
+            k = int(np.argmax(gaps[row]))
+            if gaps[row, k] <= getattr(self, name).difference:
+                continue
+            ours, theirs, dof = mine.length[k], native.length[k], ""
+            if name == "velocity":
+                ours, theirs = mine.velocity[k], native.velocity[k]
+            elif name == "moment_arm":
+                d = int(np.argmax(np.abs(mine.jacobian[k] - native.jacobian[k])))
+                ours, theirs = mine.jacobian[k, d], native.jacobian[k, d]
+                dof = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, int(model.dof_jntid[d]))
+            where = motion.name, float(motion.at[k]), _joints(model, motion.qpos[k])
+            setattr(self, name, Extreme(float(gaps[row, k]), *where, float(theirs), float(ours), dof))
+
+    def _keep_curves(self, motion: Motion, twin: Twin, gap: float) -> None:
+        """Keep the sweep that shows most: the largest difference, else the largest change of length."""
+        if not motion.continuous:
+            return
+        change = float(np.ptp(twin.native.length))
+        score = (gap if gap > AGREE else 0.0, change)
+        if self.curves is not None and score <= self._score:
+            return
+        self._score = score
+        mine = twin.mjwrap
+        self.curves = Curves(
+            motion.name, motion.at, twin.native.length, slope(twin.native, motion),
+            None if mine is None else mine.length, None if mine is None else slope(mine, motion), twin.status != 0,
+        )  # fmt: skip
+
+    _score: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def at_fault(self) -> int:
+        """Number of poses at which mjwrap, not MuJoCo, is wrong or without an answer."""
+        return sum(self.counts[outcome.name] for outcome in MJWRAP_AT_FAULT)
+
+
+def slope(record: PathRecord, motion: Motion) -> Array:
+    """Return dl/d(at) (T,) along a sweep [m/rad or 1]."""
+    return np.einsum("tj,tj->t", record.jacobian, motion.tangent)
+
+
+def _geom(model: mujoco.MjModel, twin: Twin, span: int) -> str:
+    if span < 0:
+        return ""
+    return name_of(model, mujoco.mjtObj.mjOBJ_GEOM, twin.spans[span].geom)
+
+
+def _joints(model: mujoco.MjModel, qpos: Array) -> dict[str, float]:
+    """Return the positions of all hinges and slides by name."""
+    single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    return {
+        name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j): float(qpos[model.jnt_qposadr[j]])
+        for j in range(model.njnt)
+        if int(model.jnt_type[j]) in single
+    }

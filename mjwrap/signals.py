@@ -1,0 +1,272 @@
+"""Numbers over time for excitations, controls and prescribed motion: patterns written in a few words, and CSV files."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import SignalError
+
+Array = NDArray[np.float64]
+TURN = 2.0 * math.pi
+
+
+class Signal(Protocol):
+    """A number that changes with time."""
+
+    def value(self, t: float) -> float:
+        """Return the number at time t [s]."""
+        ...
+
+
+class SmoothSignal(Signal, Protocol):
+    """A signal with two derivatives, which a joint can follow."""
+
+    def rate(self, t: float) -> float:
+        """Return the first derivative at time t [1/s]."""
+        ...
+
+    def acceleration(self, t: float) -> float:
+        """Return the second derivative at time t [1/s²]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same number at all times."""
+
+    level: float
+
+    def value(self, t: float) -> float:
+        return self.level
+
+    def rate(self, t: float) -> float:
+        return 0.0
+
+    def acceleration(self, t: float) -> float:
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """Zero before `start` [s], `level` from then on."""
+
+    level: float
+    start: float
+
+    def value(self, t: float) -> float:
+        return self.level if t >= self.start else 0.0
+
+
+@dataclass(frozen=True)
+class Sine:
+    """offset + amplitude sin(2π (frequency t + phase)), frequency in Hz, phase in turns."""
+
+    amplitude: float
+    frequency: float
+    offset: float = 0.0
+    phase: float = 0.0
+
+    def value(self, t: float) -> float:
+        return self.offset + self.amplitude * math.sin(TURN * (self.frequency * t + self.phase))
+
+    def rate(self, t: float) -> float:
+        omega = TURN * self.frequency
+        return self.amplitude * omega * math.cos(TURN * (self.frequency * t + self.phase))
+
+    def acceleration(self, t: float) -> float:
+        omega = TURN * self.frequency
+        return -self.amplitude * omega**2 * math.sin(TURN * (self.frequency * t + self.phase))
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """Smooth humps of height `peak`, one each `period` [s] and half as long, the first one after `phase` turns."""
+
+    peak: float
+    period: float
+    phase: float
+
+    def value(self, t: float) -> float:
+        turns = t / self.period - self.phase
+        wave = math.sin(TURN * turns)
+        return self.peak * wave * wave if turns > 0.0 and wave > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Wander:
+    """A new level between 0 and 1 every `hold` [s], drawn with `seed` and joined smoothly; the same on every run."""
+
+    seed: tuple[int, ...]
+    hold: float = 0.25
+
+    def value(self, t: float) -> float:
+        place = max(t, 0.0) / self.hold
+        k = int(place)
+        blend = 0.5 - 0.5 * math.cos(math.pi * (place - k))
+        return (1.0 - blend) * self._level(k) + blend * self._level(k + 1)
+
+    def _level(self, k: int) -> float:
+        digits = ",".join(map(str, (*self.seed, k)))
+        # splitmix64 of a checksum: as good as a generator here, and far cheaper to start anew for every k
+        z = (zlib.crc32(digits.encode()) * 0x9E3779B97F4A7C15 + 0x9E3779B97F4A7C15) % 2**64
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) % 2**64
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) % 2**64
+        return float((z ^ (z >> 31)) >> 11) / 2**53
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Values at given times: straight lines in between, the first and last value held outside."""
+
+    times: Array
+    values: Array
+
+    def value(self, t: float) -> float:
+        return float(np.interp(t, self.times, self.values))
+
+
+Maker = Callable[[str, int, int], Signal]
+
+# name: form, fewest numbers, most numbers
+PATTERNS = {
+    "constant": ("constant:LEVEL", 1, 1),
+    "step": ("step:LEVEL@TIME", 2, 2),
+    "sine": ("sine:AMPLITUDE,HZ[,OFFSET[,PHASE]]", 2, 4),
+    "cosine": ("cosine:AMPLITUDE,HZ[,OFFSET[,PHASE]]", 2, 4),
+    "pulses": ("pulses[:PEAK[,PERIOD]]", 0, 2),
+    "random": ("random[:SEED[,HOLD]]", 0, 2),
+}
+
+
+def pattern_forms() -> str:
+    """Return the forms of all patterns, for help and errors."""
+    return ", ".join(form for form, _, _ in PATTERNS.values())
+
+
+def parse_pattern(text: str, seed: int = 0) -> Maker:
+    """Return a function (name, index, count) -> `Signal` for a pattern such as "sine:0.3,1,0.5".
+
+    index and count let `pulses` run through all muscles in turn, the name gives every muscle its own `random`. seed:
+    used by `random` without one. `SignalError` names what is wrong and lists the forms.
+    """
+    kind, _, rest = text.partition(":")
+    if kind not in PATTERNS:
+        raise SignalError(f"'{text}' is not a pattern; patterns: {pattern_forms()}")
+    form, fewest, most = PATTERNS[kind]
+    parts = rest.replace("@", ",").split(",") if rest else []
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        raise SignalError(f"'{text}': {rest!r} does not fit {form}") from None
+    if not fewest <= len(numbers) <= most or (kind == "step") != ("@" in rest):
+        raise SignalError(f"'{text}' does not fit {form}")
+    if not all(math.isfinite(x) for x in numbers):
+        raise SignalError(f"'{text}': every number must be finite")
+    return _maker(text, kind, numbers, seed)
+
+
+def _maker(text: str, kind: str, numbers: list[float], seed: int) -> Maker:
+    if kind == "constant":
+        return lambda name, index, count: Constant(numbers[0])
+    if kind == "step":
+        return lambda name, index, count: Step(numbers[0], numbers[1])
+    if kind in ("sine", "cosine"):
+        amplitude, frequency, offset, phase = (*numbers, 0.0, 0.0)[:4]
+        late = phase + (0.25 if kind == "cosine" else 0.0)
+        return lambda name, index, count: Sine(amplitude, frequency, offset, late)
+    if kind == "pulses":
+        peak, period = (*numbers, *(0.3, 1.0)[len(numbers) :])
+        if not period > 0.0:
+            raise SignalError(f"'{text}': the period must be positive [s]")
+        return lambda name, index, count: Pulse(peak, period, index / max(count, 1))
+    chosen, hold = (*numbers, *(float(seed), 0.25)[len(numbers) :])
+    if chosen != int(chosen) or chosen < 0:
+        raise SignalError(f"'{text}': the seed must be a whole number, 0 or more")
+    if not hold > 0.0:
+        raise SignalError(f"'{text}': the time between new levels must be positive [s]")
+    return lambda name, index, count: Wander((int(chosen), zlib.crc32(name.encode())), hold)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of numbers over time, as read from a file: times (T,) [s], columns by name (T,)."""
+
+    path: str
+    times: Array
+    columns: dict[str, Array]
+
+    def signal(self, column: str) -> Samples:
+        """Return one column as a signal."""
+        return Samples(self.times, self.columns[column])
+
+    def require(self, known: Sequence[str], what: str) -> None:
+        """Raise `SignalError` for columns that are none of the `known` names, and list these."""
+        unknown = [name for name in self.columns if name not in known]
+        if unknown:
+            s = "s" * (len(unknown) != 1)
+            raise SignalError(
+                f"{self.path}: no {what} for column{s} {', '.join(repr(n) for n in unknown)}; "
+                f"there are: {', '.join(known) or 'none'}"
+            )
+
+
+def read_table(path: str | os.PathLike[str]) -> Table:
+    """Read a CSV file: a header with `time` [s] and names, then rows of finite numbers, times increasing.
+
+    `SignalError` names file, line and column of the first thing that is wrong.
+    """
+    name = os.fspath(path)
+    try:
+        with open(name, encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row[1])]
+    except OSError as error:
+        raise SignalError(f"cannot read '{name}': {(error.strerror or str(error)).lower()}") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise SignalError(f"'{name}' is not a text file with comma-separated values") from None
+    if not rows:
+        raise SignalError(f"'{name}' is empty; wanted: a header with 'time' and names, then rows of numbers")
+    header = [cell.strip() for cell in rows[0][1]]
+    if "time" not in header:
+        raise SignalError(f"'{name}' has no column 'time' [s]; its columns: {', '.join(header)}")
+    double = sorted({column for column in header if header.count(column) > 1})
+    if double or "" in header:
+        which = ", ".join(double) or "the blank ones"
+        raise SignalError(f"'{name}': every column needs a name of its own; look at {which}")
+    if len(rows) < 2:
+        raise SignalError(f"'{name}' has a header but no rows")
+    numbers = np.array([_numbers(name, line, header, row) for line, row in rows[1:]])
+    times = numbers[:, header.index("time")]
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if late.size:
+        line = rows[int(late[0]) + 2][0]
+        raise SignalError(
+            f"'{name}' line {line}: time {times[late[0] + 1]:g} does not come after {times[late[0]]:g}"
+        )
+    columns = {column: numbers[:, i].copy() for i, column in enumerate(header) if column != "time"}
+    return Table(name, times.copy(), columns)
+
+
+def _numbers(name: str, line: int, header: list[str], row: list[str]) -> list[float]:
+    if len(row) != len(header):
+        raise SignalError(f"'{name}' line {line}: {len(row)} cells where the header has {len(header)}")
+    values = []
+    for column, cell in zip(header, row, strict=True):
+        try:
+            value = float(cell)
+        except ValueError:
+            raise SignalError(
+                f"'{name}' line {line}, column '{column}': {cell.strip()!r} is not a number"
+            ) from None
+        if not math.isfinite(value):
+            raise SignalError(f"'{name}' line {line}, column '{column}': {cell.strip()} is not finite")
+        values.append(value)
+    return values

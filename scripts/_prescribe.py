@@ -1,0 +1,107 @@
+"""Joints that follow a given motion, whatever pulls at them; the rest of the model feels that motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from _common import UserError, find_joint
+from numpy.typing import NDArray
+
+from mjwrap import MuscleSystem
+from mjwrap.errors import SignalError
+from mjwrap.signals import Constant, Sine, SmoothSignal, parse_pattern, read_table
+
+Array = NDArray[np.float64]
+
+
+class Spline:
+    """A smooth curve through samples; the first and last value are held outside."""
+
+    def __init__(self, times: Array, values: Array) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self._low, self._high = float(times[0]), float(times[-1])
+        # at rest at both ends, where the value is held from
+        self._curve = CubicSpline(times, values, bc_type="clamped") if len(times) > 1 else None
+        self._only = float(values[0])
+
+    def _at(self, t: float, order: int) -> float:
+        if self._curve is None:
+            return 0.0 if order else self._only
+        if order and not self._low <= t <= self._high:
+            return 0.0
+        return float(self._curve(min(max(t, self._low), self._high), order))
+
+    def value(self, t: float) -> float:
+        """Return the number at time t."""
+        return self._at(t, 0)
+
+    def rate(self, t: float) -> float:
+        """Return the first derivative at time t."""
+        return self._at(t, 1)
+
+    def acceleration(self, t: float) -> float:
+        """Return the second derivative at time t."""
+        return self._at(t, 2)
+
+
+class Prescribed:
+    """The prescribed joints of a run.
+
+    entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a CSV file with a column `time` and one for
+    each joint. Positions in rad or m.
+    """
+
+    def __init__(self, model: mujoco.MjModel, muscles: MuscleSystem, entries: Sequence[str]) -> None:
+        self._model, self._muscles = model, muscles
+        found: dict[int, SmoothSignal] = {}
+        for entry in entries:
+            name, equals, pattern = entry.partition("=")
+            if equals:
+                found[find_joint(model, name, entry)] = _smooth(name, pattern)
+            else:
+                table = read_table(entry)
+                for column, values in table.columns.items():
+                    found[find_joint(model, column, entry)] = Spline(table.times, values)
+        self.joints = list(found)
+        self._signals = list(found.values())
+        self._qpos = np.array([model.jnt_qposadr[j] for j in found], dtype=np.int64)
+        self._dofs = np.array([model.jnt_dofadr[j] for j in found], dtype=np.int64)
+
+    def place(self, data: mujoco.MjData) -> None:
+        """Put the joints where they should be at `data.time`, with their speeds."""
+        if self.joints:
+            data.qpos[self._qpos] = [signal.value(data.time) for signal in self._signals]
+            data.qvel[self._dofs] = [signal.rate(data.time) for signal in self._signals]
+
+    def drive(self, data: mujoco.MjData) -> None:
+        """Apply the joint forces that give the joints their accelerations, so that other joints feel them."""
+        if not self.joints:
+            return
+        model, dofs = self._model, self._dofs
+        self._muscles.apply(data)
+        data.qfrc_applied[dofs] = 0.0
+        mujoco.mj_forward(model, data)
+        wanted = np.array([signal.acceleration(data.time) for signal in self._signals]) - data.qacc[dofs]
+        unit, answer = np.zeros((len(dofs), model.nv)), np.zeros((len(dofs), model.nv))
+        unit[np.arange(len(dofs)), dofs] = 1.0
+        mujoco.mj_solveM(model, data, answer, unit)
+        data.qfrc_applied[dofs] = np.linalg.solve(answer[:, dofs], wanted)
+
+
+def _smooth(name: str, pattern: str) -> SmoothSignal:
+    signal = parse_pattern(pattern)(name, 0, 1)
+    if not isinstance(signal, Constant | Sine):
+        raise SignalError(
+            f"'{name}={pattern}': a joint can follow a constant, sine, cosine or file; it cannot jump"
+        )
+    return signal
+
+
+def check_free(joints: Sequence[int], positions: Sequence[str], model: mujoco.MjModel) -> None:
+    """Raise `UserError` where a start position is given for a joint that is prescribed."""
+    for entry in positions:
+        if find_joint(model, entry.partition("=")[0], entry) in joints:
+            raise UserError(f"'{entry}': this joint's position is prescribed")
