@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.errors import GeometryError, PathError, StateError
+from mjwrap.errors import GeometryError, ModelError, PathError, StateError
 from mjwrap.kernels import coupling, drawing, layout, readiness, segments
 from mjwrap.mjcf import MuscleDeclaration, name_of, read_declarations
 from mjwrap.paths import Status
@@ -76,6 +76,7 @@ class MuscleSystem:
         self._plan = build_plan(model, found.muscles)
         self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
         self._states: dict[int, _State] = {}
+        self._released = False
         self._last = _State(model, self._plan)
         self.excitation: Array = np.zeros(self._plan.n)
         self._root = np.asarray(model.body_rootid, dtype=np.int64)
@@ -143,12 +144,18 @@ class MuscleSystem:
         for i, count in enumerate(self.failures):
             if count:
                 reason = Status(int(self._last.last_failure[i])).message
-                lines.append(f"{self.names[i]}: {count} step{'s' * (count != 1)} without a path; at last {reason}")
+                lines.append(
+                    f"{self.names[i]}: {count} step{'s' if count != 1 else ''} without a path; at last {reason}"
+                )
         return "\n".join(lines)
 
     # ----------------------------------------------------------------------------------- evaluation
 
     def _state(self, data: mujoco.MjData) -> _State:
+        if self._released:
+            raise ModelError(
+                "this MuscleSystem has given its actuators back (release); build a new one to go on"
+            )
         if not isinstance(data, mujoco.MjData):
             raise StateError(f"expected an MjData, not {type(data).__name__}")
         if data.model._address != self.model._address:
@@ -161,13 +168,24 @@ class MuscleSystem:
 
     def _check(self, data: mujoco.MjData) -> None:
         """Raise `StateError` naming what is not finite."""
-        for what, values in (("qpos", data.qpos), ("qvel", data.qvel), ("act", data.act), ("ctrl", data.ctrl)):
+        for what, values in (
+            ("qpos", data.qpos),
+            ("qvel", data.qvel),
+            ("act", data.act),
+            ("ctrl", data.ctrl),
+            ("mocap_pos", data.mocap_pos.ravel()),
+            ("mocap_quat", data.mocap_quat.ravel()),
+        ):
             bad = readiness.first_bad(values)
             if bad >= 0:
-                raise StateError(f"{what}[{bad}]{self._owner(what, bad)} is not finite at time {data.time:g} s")
+                raise StateError(
+                    f"{what}[{bad}]{self._owner(what, bad)} is not finite at time {data.time:g} s"
+                )
         bad = readiness.first_bad(self.excitation)
         if bad >= 0:
-            raise StateError(f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s")
+            raise StateError(
+                f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s"
+            )
 
     def _owner(self, what: str, index: int) -> str:
         model = self.model
@@ -179,7 +197,12 @@ class MuscleSystem:
             return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, int(model.dof_jntid[index]))}')"
         if what == "ctrl":
             return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, index)}')"
-        return ""
+        if what == "act":
+            first, count = model.actuator_actadr, model.actuator_actnum
+            actuator = int(np.flatnonzero((first <= index) & (index < first + count))[0])
+            return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, actuator)}')"
+        body = int(np.flatnonzero(model.body_mocapid == index // (3 if what == "mocap_pos" else 4))[0])
+        return f" (mocap body '{name_of(model, kinds.mjOBJ_BODY, body)}')"
 
     def _evaluate(self, state: _State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
         """Paths, activations and tensions from the poses and velocities of `poses`; wrenches into state.wrench."""
@@ -198,7 +221,14 @@ class MuscleSystem:
             state.length, state.velocity, state.tension, state.status,
         )  # fmt: skip
         coupling.body_wrenches(
-            plan.routes, plan.weights, plan.links, state.segments, state.count, state.tension, poses.xipos, state.wrench
+            plan.routes,
+            plan.weights,
+            plan.links,
+            state.segments,
+            state.count,
+            state.tension,
+            poses.xipos,
+            state.wrench,
         )
         self._last = state
         state.time = data.time
@@ -212,7 +242,9 @@ class MuscleSystem:
         first = int(bad[0])
         if (state.status == Status.NON_FINITE).any():
             first = int(np.flatnonzero(state.status == Status.NON_FINITE)[0])
-            raise StateError(f"muscle '{self.names[first]}': a pose or force is not finite at time {data.time:g} s")
+            raise StateError(
+                f"muscle '{self.names[first]}': a pose or force is not finite at time {data.time:g} s"
+            )
         if self.strict:
             reason = Status(int(state.status[first])).message
             raise PathError(f"muscle '{self.names[first]}' at time {data.time:g} s: {reason}")
@@ -284,6 +316,7 @@ class MuscleSystem:
                         self._act(state, data)
                         state.failures += state.status != 0
                     mujoco.mj_step2(self.model, data)
+                    self._take_back(state, data)
                     self._advance_own(state, self.model.opt.timestep)
         finally:
             self._take_back(state, data)
@@ -301,7 +334,9 @@ class MuscleSystem:
     def _advance_own(self, state: _State, duration: float) -> None:
         plan = self._plan
         if plan.has_own:
-            readiness.advance_own(plan.source, self.excitation, plan.times, duration, state.own, state.own_now)
+            readiness.advance_own(
+                plan.source, self.excitation, plan.times, duration, state.own, state.own_now
+            )
             state.own[:] = state.own_now
 
     def _take_back(self, state: _State, data: mujoco.MjData) -> None:
@@ -320,13 +355,15 @@ class MuscleSystem:
             try:
                 if plan.has_own:
                     since = max(data.time - start, 0.0)
-                    readiness.advance_own(plan.source, self.excitation, plan.times, since, state.own, state.own_now)
+                    readiness.advance_own(
+                        plan.source, self.excitation, plan.times, since, state.own, state.own_now
+                    )
                 self._act(state, data)
                 np.logical_or(failed, state.status != 0, out=failed)
             except Exception as error:  # an exception must not cross MuJoCo's C frames; it is raised below
                 caught.append(error)
 
-        with _control_callback(act):
+        with _control_callback(act, lambda: self._take_back(state, data)):
             for _ in range(nstep):
                 self._check(data)
                 start = data.time
@@ -352,14 +389,17 @@ class MuscleSystem:
         self._last.forget()
 
     def release(self) -> None:
-        """Give the native actuators their forces back, as they were before the model was taken over."""
+        """Give the native actuators their forces back, as they were; this MuscleSystem can evaluate no more."""
+        self._released = True
         self._takeover.release()
 
     # -------------------------------------------------------------------------------------- geometry
 
     def _known(self, i: int) -> int:
         if not 0 <= i < self.n:
-            raise GeometryError(f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}")
+            raise GeometryError(
+                f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}"
+            )
         return int(i)
 
     def _polylines(self, spacing: float | None, only: int) -> tuple[Array, NDArray[np.int64]]:
@@ -428,13 +468,22 @@ def _resets(data: mujoco.MjData) -> int:
 
 
 @contextmanager
-def _control_callback(act: Callable[[mujoco.MjData], None]) -> Iterator[None]:
-    """Run `act` in MuJoCo's control callback, after whatever callback is there, for the length of a with block."""
+def _control_callback(act: Callable[[mujoco.MjData], None], retreat: Callable[[], None]) -> Iterator[None]:
+    """Run `act` in MuJoCo's control callback for the length of a with block.
+
+    A callback that is there already, a Python function or a C function pointer, runs first, after `retreat` has taken
+    out of the data what `act` put in at the stage before.
+    """
     before: Any = mujoco.get_mjcb_control()
+    compiled = hasattr(before, "argtypes")
 
     def callback(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        if callable(before):
-            before(model, data)
+        if before is not None:
+            retreat()
+            if compiled:
+                before(model._address, data._address)
+            else:
+                before(model, data)
         act(data)
 
     mujoco.set_mjcb_control(callback)

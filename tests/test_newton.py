@@ -12,7 +12,7 @@ from scenes import random_scene
 import mjwrap as mw
 from mjwrap.kernels import geodesics, newton
 from mjwrap.kernels import layout as lay
-from mjwrap.paths import _pack
+from mjwrap.paths.scene import pack
 
 Array = NDArray[np.float64]
 ROWS = ["c", "s", "cc", "sc", "css", "cscc", "csccs"]
@@ -24,7 +24,7 @@ def solved(rng: np.random.Generator, kinds: str) -> tuple[Array, tuple[float, ..
         origin, insertion, row = random_scene(rng, kinds, hints=True)
         sol = mw.solve_path(origin, insertion, row)
         if sol.converged and all(c.active and c.arc_length > 2e-3 for c in sol.contacts):
-            node = _pack(row)
+            node = pack(row)
             node[:] = sol._node
             return node, (*origin, 0.0, 0.0, 0.0, *(insertion - origin))
 

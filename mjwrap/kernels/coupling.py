@@ -260,20 +260,31 @@ def length_jacobian(
 def take_back(xfrc, others, mine, total, written):
     """Leave in xfrc_applied (nbody, 6) what others put there.
 
-    Rows still as mjwrap wrote them get others' share back to the bit; rows set to zero since then (a reset) stay zero;
-    from rows that others have changed, mjwrap's last contribution is subtracted.
+    Rows still as mjwrap wrote them get others' share back to the bit. Where a row was set to zero since then (a reset,
+    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back. From rows
+    that others have changed otherwise, mjwrap's last contribution is subtracted.
     """
+    cleared, untouched = False, False
+    for b in range(xfrc.shape[0]):
+        if written[b]:
+            zero, same = True, True
+            for i in range(6):
+                zero = zero and xfrc[b, i] == 0.0
+                same = same and xfrc[b, i] == total[b, i]
+            cleared = cleared or (zero and not same)
+            untouched = untouched or (same and not zero)
+    cleared = cleared and not untouched
     for b in range(xfrc.shape[0]):
         if not written[b]:
             continue
-        same, zero = True, True
+        zero, same = True, True
         for i in range(6):
-            same = same and xfrc[b, i] == total[b, i]
             zero = zero and xfrc[b, i] == 0.0
+            same = same and xfrc[b, i] == total[b, i]
         for i in range(6):
             if same:
                 xfrc[b, i] = others[b, i]
-            elif not zero:
+            elif not (zero or cleared):
                 xfrc[b, i] -= mine[b, i]
         written[b] = False
 

@@ -1,0 +1,21 @@
+"""One path in space: obstacles with world poses in, a certified geodesic path out; no MuJoCo.
+
+Everything is in SI units and world coordinates unless it says otherwise.
+"""
+
+from mjwrap.paths.scene import Obstacle, ViaPoint
+from mjwrap.paths.solution import Contact, PathSolution
+from mjwrap.paths.solve import solve_path
+from mjwrap.paths.status import Status
+from mjwrap.paths.sweep import SweepSolution, solve_sweep
+
+__all__ = [
+    "Contact",
+    "Obstacle",
+    "PathSolution",
+    "Status",
+    "SweepSolution",
+    "ViaPoint",
+    "solve_path",
+    "solve_sweep",
+]

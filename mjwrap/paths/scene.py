@@ -1,0 +1,89 @@
+"""What a path is laid over: obstacles with world poses, via points, and their rows for the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import chain, layout
+from mjwrap.surfaces import Surface
+
+Array = NDArray[np.float64]
+
+
+def vector(value: ArrayLike, size: int, what: str) -> tuple[float, ...]:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise GeometryError(f"{what} must be {size} numbers, not {value!r}") from None
+    if array.shape != (size,):
+        raise GeometryError(f"{what} must have shape ({size},), not {array.shape}")
+    if not np.isfinite(array).all():
+        raise GeometryError(f"{what} must be finite, not {array.tolist()}")
+    return tuple(array.tolist())
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A wrapping surface at a pose in the world.
+
+    surface: a `Surface`; pos (3,): origin of its frame [m]; quat (4,): w, x, y, z, any length but zero; hint (3,) or
+    None: a point in the surface's frame [m] near which the path should touch at a cold start. `GeometryError` for
+    anything else.
+    """
+
+    surface: Surface
+    pos: tuple[float, ...] = (0.0, 0.0, 0.0)
+    quat: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    hint: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.surface, Surface):
+            raise GeometryError(f"Obstacle: surface must be a Surface such as Cylinder, not {self.surface!r}")
+        object.__setattr__(self, "pos", vector(self.pos, 3, "Obstacle: pos"))
+        object.__setattr__(self, "quat", vector(self.quat, 4, "Obstacle: quat"))
+        if not any(self.quat):
+            raise GeometryError("Obstacle: quat must not be zero")
+        if self.hint is not None:
+            object.__setattr__(self, "hint", vector(self.hint, 3, "Obstacle: hint"))
+
+
+@dataclass(frozen=True)
+class ViaPoint:
+    """A point that the path runs through; it may stand anywhere among the obstacles.
+
+    pos (3,): world coordinates [m], finite, else `GeometryError`.
+    """
+
+    pos: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pos", vector(self.pos, 3, "ViaPoint: pos"))
+
+
+def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
+    """Return the kernels' rows for a list of obstacles, cold."""
+    node = np.zeros((len(obstacles), layout.ROW))
+    node[:, layout.S_MODE] = layout.COLD
+    for k, obstacle in enumerate(obstacles):
+        if not isinstance(obstacle, Obstacle | ViaPoint):
+            raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")
+        node[k, layout.POS : layout.POS + 3] = obstacle.pos
+        if isinstance(obstacle, ViaPoint):
+            node[k, layout.KIND] = layout.VIA
+            continue
+        node[k, layout.KIND] = obstacle.surface.kind
+        dims = obstacle.surface.dims
+        node[k, layout.DIM : layout.DIM + len(dims)] = dims
+        chain.set_rotation(node, k, *obstacle.quat)
+        if obstacle.hint is not None:
+            node[k, layout.HINT] = 1.0
+            node[k, layout.HINT + 1 : layout.HINT + 4] = obstacle.hint
+    return node
+
+
+SAVED = slice(layout.S_MODE, layout.S_MODE + layout.STATE)

@@ -1,0 +1,131 @@
+"""The answer of a single solve, and what follows from it: points, speed, wrenches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import layout, polyline, segments
+from mjwrap.paths.scene import SAVED, Array, vector
+from mjwrap.paths.status import Status
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Where a path touches one obstacle.
+
+    active: whether it does; P, Q (3,): first and last contact point, world [m] (None where not active);
+    arc_length: of the geodesic from P to Q [m]. A via point is always active, with P = Q.
+    """
+
+    active: bool
+    P: Array | None
+    Q: Array | None
+    arc_length: float
+
+
+class PathSolution:
+    """The answer of `solve_path`: length, contacts, and on demand points, speed and wrenches.
+
+    length [m]; status: `Status`; converged: status is CONVERGED; tangency_error: the norm of f over all touched
+    obstacles (30); iterations: Newton steps; evaluations: evaluations of all residuals at once; contacts: one
+    `Contact` per obstacle. Where the path was not found the length is that of the last iterate, never NaN.
+    """
+
+    def __init__(
+        self, origin: tuple[float, ...], insertion: tuple[float, ...], node: Array, saved: Array
+    ) -> None:
+        self._origin, self._insertion, self._node, self._saved = origin, insertion, node, saved
+        self._ends = (0, len(node), *origin, *insertion)
+        self.length = 0.0
+        self.status = Status.NOT_CONVERGED
+        self.tangency_error = 0.0
+        self.iterations = 0
+        self.evaluations = 0
+        self.contacts: list[Contact] = []
+        self._segments = np.zeros((len(node) + 1, segments.SEGMENT))
+        self._count = 0
+
+    def _finish(self, info: Array, saved_before: Array) -> None:
+        self.length = float(info[layout.I_LENGTH])
+        self.status = Status(int(info[layout.I_STATUS]))
+        self.tangency_error = float(info[layout.I_ERROR])
+        self.iterations = int(info[layout.I_ITERATIONS])
+        self.evaluations = int(info[layout.I_EVALUATIONS])
+        self._saved = self._node[:, SAVED].copy() if self.converged else saved_before
+        self._count = segments.list_segments(*self._ends, self._node, self._segments, 0)
+        self.contacts = [self._contact(k) for k in range(len(self._node))]
+
+    def _contact(self, k: int) -> Contact:
+        row = self._node[k]
+        if row[layout.KIND] == layout.VIA:
+            here = row[layout.POS : layout.POS + 3].copy()
+            return Contact(True, here, here.copy(), 0.0)
+        if row[layout.S_MODE] != layout.TOUCHED:
+            return Contact(False, None, None, 0.0)
+        base = np.array(self._origin)
+        first, last = row[layout.W_P : layout.W_P + 3] + base, row[layout.W_Q : layout.W_Q + 3] + base
+        return Contact(True, first, last, float(row[layout.S_ARC]))
+
+    @property
+    def converged(self) -> bool:
+        """Whether the path was found and certified."""
+        return self.status == Status.CONVERGED
+
+    def __repr__(self) -> str:
+        touched = sum(contact.active for contact in self.contacts)
+        return (
+            f"PathSolution({self.status.name}, length={self.length:.9g} m, {touched} of {len(self.contacts)} touched, "
+            f"tangency error {self.tangency_error:.1e})"
+        )
+
+    def points(self, spacing: float | None = None) -> Array:
+        """Return points along the path, (m, 3), world [m], at most `spacing` [m] apart.
+
+        Without a spacing, straight segments have their end points only and geodesics a point every 0.1 rad of turning.
+        """
+        if spacing is not None and not (np.isfinite(spacing) and spacing > 0.0):
+            raise GeometryError(f"spacing must be finite and positive [m], not {spacing!r}")
+        step = 0.0 if spacing is None else float(spacing)
+        count = polyline.polyline(*self._ends, self._node, step, np.empty((0, 3)), 0)
+        out = np.empty((count, 3))
+        polyline.polyline(*self._ends, self._node, step, out, 0)
+        return out
+
+    def speed(
+        self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None = None
+    ) -> float:
+        """Return the lengthening speed l̇ (17) [m/s], positive when the path grows.
+
+        origin_velocity, insertion_velocity (3,) [m/s]; twists (n, 6), one per obstacle or via point: linear velocity of
+        the pose's origin [m/s], then angular velocity [rad/s], world frame; None where nothing moves.
+        """
+        n = len(self._node)
+        pos, twist = np.zeros((n + 2, 3)), np.zeros((n + 2, 6))
+        pos[0], pos[1:-1], pos[-1] = self._origin, self._node[:, layout.POS : layout.POS + 3], self._insertion
+        twist[0, :3] = vector(origin_velocity, 3, "origin_velocity")
+        twist[-1, :3] = vector(insertion_velocity, 3, "insertion_velocity")
+        if twists is not None:
+            given = np.asarray(twists, dtype=np.float64)
+            if given.size or n:
+                if given.shape != (n, 6):
+                    raise GeometryError(f"twists must have shape ({n}, 6), not {given.shape}")
+                twist[1:-1] = given
+        if not np.isfinite(twist).all():
+            raise GeometryError("twists must be finite")
+        return float(segments.lengthening_rate(self._count, self._segments, pos, twist))
+
+    def wrenches(self, tension: float) -> Array:
+        """Return what the path under `tension` [N] does to origin, each obstacle and insertion.
+
+        (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
+        is -tension l̇ (method section 5).
+        """
+        if not np.isfinite(tension):
+            raise GeometryError(f"tension must be finite [N], not {tension!r}")
+        wrench = np.zeros((len(self._node) + 2, 6))
+        segments.add_wrenches(self._count, self._segments, float(tension), wrench)
+        return wrench

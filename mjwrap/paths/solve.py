@@ -1,0 +1,130 @@
+"""solve_path: one path at one pose, by the production solver or by one of the paper's methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import chain, layout
+from mjwrap.paths.scene import SAVED, Array, Obstacle, ViaPoint, pack, vector
+from mjwrap.paths.solution import PathSolution
+
+
+def _start(start: PathSolution | None, node: Array) -> None:
+    if start is None:
+        return
+    if not isinstance(start, PathSolution):
+        raise GeometryError(f"start must be the PathSolution of an earlier solve, not {start!r}")
+    if not np.array_equal(start._node[:, layout.KIND], node[:, layout.KIND]):
+        raise GeometryError("start belongs to a path over other obstacles: number and kinds must be the same")
+    node[:, SAVED] = start._saved
+
+
+def solve_path(
+    origin: ArrayLike,
+    insertion: ArrayLike,
+    obstacles: Sequence[Obstacle | ViaPoint] = (),
+    *,
+    method: str = "newton",
+    start: PathSolution | None = None,
+    tol: float = 1e-10,
+    **options: Any,
+) -> PathSolution:
+    """Find the C1 geodesic path of a taut string from origin to insertion over a row of obstacles.
+
+    origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
+    an earlier solution for the same obstacles elsewhere, whose branch (side, winding) is kept; tol: largest tangency
+    error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`).
+    Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
+    """
+    if not (np.isfinite(tol) and tol > 0.0):
+        raise GeometryError(f"tol must be finite and positive, not {tol!r}")
+    here, there = vector(origin, 3, "origin"), vector(insertion, 3, "insertion")
+    node = pack(obstacles)
+    _start(start, node)
+    before = node[:, SAVED].copy()
+    solution = PathSolution(here, there, node, before)
+    info = np.zeros((1, layout.INFO))
+    if method == "newton":
+        if options:
+            raise GeometryError(f"method 'newton' has no options; got {', '.join(options)}")
+        direct = start is None
+        chain.solve_chain(*solution._ends, node, float(tol), direct, info, 0)
+    else:
+        _solve_with(method, here, there, obstacles, node, start, float(tol), options, info)
+    solution._finish(info[0], before)
+    return solution
+
+
+def _solve_with(
+    method: str,
+    origin: tuple[float, ...],
+    insertion: tuple[float, ...],
+    obstacles: Sequence[Obstacle | ViaPoint],
+    node: Array,
+    start: PathSolution | None,
+    tol: float,
+    options: dict[str, Any],
+    info: Array,
+) -> None:
+    """Solve span after span with one of the paper's methods and evaluate the result with the kernels."""
+    from mjwrap import methods
+
+    if method not in methods.METHODS:
+        raise GeometryError(f"method {method!r} is none of: newton, {', '.join(methods.METHODS)}")
+    good, iterations, evaluations = True, 0, 0
+    stops = [k for k, obstacle in enumerate(obstacles) if isinstance(obstacle, ViaPoint)] + [len(obstacles)]
+    first, here = 0, np.array(origin)
+    for stop in stops:
+        there = np.array(insertion) if stop == len(obstacles) else np.array(obstacles[stop].pos)
+        if stop > first:
+            result = _solve_span_with(
+                method, here, there, obstacles[first:stop], node[first:stop], start is not None, tol, options
+            )
+            good = good and result.converged
+            iterations += result.iterations
+            evaluations += result.evaluations
+        first, here = stop + 1, there
+    chain.evaluate_chain(0, len(node), *origin, *insertion, node, info, 0)
+    good = good and info[0, layout.I_ERROR] <= tol
+    info[0, layout.I_STATUS] = layout.CONVERGED if good else layout.NOT_CONVERGED
+    info[0, layout.I_ITERATIONS] = iterations
+    info[0, layout.I_EVALUATIONS] = evaluations
+
+
+def _solve_span_with(
+    method: str,
+    origin: Array,
+    insertion: Array,
+    obstacles: Sequence[Obstacle | ViaPoint],
+    node: Array,
+    warm: bool,
+    tol: float,
+    options: dict[str, Any],
+) -> Any:
+    """Run one of the paper's methods between two points and write its geodesics to the rows `node`."""
+    from mjwrap import methods
+
+    n = len(node)
+    pos = node[:, layout.POS : layout.POS + 3].copy()
+    rot = node[:, layout.ROT : layout.ROT + 9].reshape(n, 3, 3).copy()
+    P, t = slice(layout.S_P, layout.S_P + 3), slice(layout.S_T, layout.S_T + 3)
+    given = None
+    if warm:
+        given = (
+            np.einsum("kij,kj->ki", rot, node[:, P]) + pos,
+            np.einsum("kij,kj->ki", rot, node[:, t]),
+            node[:, layout.S_ARC].copy(),
+            node[:, layout.S_MODE] == layout.TOUCHED,
+        )
+    surfaces = [obstacle.surface for obstacle in obstacles if isinstance(obstacle, Obstacle)]
+    result = methods.solve_chain(method, origin, insertion, surfaces, pos, rot, given, tol, **options)
+    node[:, layout.S_MODE] = np.where(result.active, layout.TOUCHED, layout.FREE)
+    node[:, P] = np.einsum("kji,kj->ki", rot, result.P - pos)
+    node[:, t] = np.einsum("kji,kj->ki", rot, result.t)
+    node[:, layout.S_ARC] = np.where(result.active, result.s, 0.0)
+    return result

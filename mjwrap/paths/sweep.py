@@ -1,0 +1,91 @@
+"""solve_sweep: a whole motion in one compiled loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import chain, layout
+from mjwrap.paths.scene import Array, Obstacle, pack
+from mjwrap.paths.status import Status
+
+
+@dataclass(frozen=True)
+class SweepSolution:
+    """The answer of `solve_sweep`, one entry per pose.
+
+    length (T,) [m]; status (T,): codes of `Status`; tangency_error (T,); iterations, evaluations (T,): what each pose
+    cost; converged: whether every pose did.
+    """
+
+    length: Array
+    status: NDArray[np.int64]
+    tangency_error: Array
+    iterations: NDArray[np.int64]
+    evaluations: NDArray[np.int64]
+
+    @property
+    def converged(self) -> bool:
+        """Whether every pose has a certified path."""
+        return bool((self.status == Status.CONVERGED).all())
+
+
+def _motion(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
+    try:
+        array = np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape))
+    except (TypeError, ValueError):
+        raise GeometryError(f"{what} must have shape {shape}, not {np.shape(value)}") from None
+    if not np.isfinite(array).all():
+        pose = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise GeometryError(f"{what} must be finite; pose {pose} is not")
+    return array
+
+
+def solve_sweep(
+    origin: ArrayLike,
+    insertion: ArrayLike,
+    obstacles: Sequence[Obstacle],
+    pos: ArrayLike,
+    quat: ArrayLike,
+    *,
+    warm: bool = True,
+    tol: float = 1e-10,
+) -> SweepSolution:
+    """Solve a whole motion in one compiled loop.
+
+    origin, insertion (T, 3) or (3,): world [m]; obstacles: n surfaces (and via points), whose own poses are not used;
+    pos (T, n, 3), quat (T, n, 4) w, x, y, z: their poses. warm: each pose starts from the ones before and keeps their
+    branch, else each starts cold. Raises `GeometryError` for arrays of other shapes or not finite.
+    """
+    n = len(obstacles)
+    node = pack(obstacles)
+    shape = np.shape(pos)
+    if len(shape) != 3 or shape[1:] != (n, 3):
+        raise GeometryError(f"pos must have shape (T, {n}, 3), not {shape}")
+    poses = shape[0]
+    where = _motion(pos, (poses, n, 3), "pos")
+    turned = _motion(quat, (poses, n, 4), "quat")
+    if n and not turned.any(axis=2).all():
+        raise GeometryError("quat must not be zero")
+    info = np.zeros((poses, layout.INFO))
+    chain.solve_motion(
+        _motion(origin, (poses, 3), "origin"),
+        _motion(insertion, (poses, 3), "insertion"),
+        where,
+        turned,
+        node,
+        bool(warm),
+        float(tol),
+        info,
+    )
+    return SweepSolution(
+        info[:, layout.I_LENGTH].copy(),
+        info[:, layout.I_STATUS].astype(np.int64),
+        info[:, layout.I_ERROR].copy(),
+        info[:, layout.I_ITERATIONS].astype(np.int64),
+        info[:, layout.I_EVALUATIONS].astype(np.int64),
+    )
