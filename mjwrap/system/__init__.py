@@ -1,0 +1,5 @@
+"""MuscleSystem: the only reader and writer of mjData."""
+
+from mjwrap.system.muscle_system import MuscleSystem
+
+__all__ = ["MuscleSystem"]

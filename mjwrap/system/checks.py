@@ -1,0 +1,52 @@
+"""Is the state of a simulation finite, and did MuJoCo reset it?"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mjwrap.errors import StateError
+from mjwrap.kernels import readiness
+from mjwrap.mjcf import name_of
+
+_BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
+_BADQVEL = int(mujoco.mjtWarning.mjWARN_BADQVEL)
+_BADQACC = int(mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+def resets(data: mujoco.MjData) -> int:
+    """Return how often MuJoCo has found the state not finite or too large; it resets the data then."""
+    number = data.warning.number
+    return int(number[_BADQPOS]) + int(number[_BADQVEL]) + int(number[_BADQACC])
+
+
+def check_state(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Raise `StateError` naming what is not finite."""
+    for what, values in (
+        ("qpos", data.qpos),
+        ("qvel", data.qvel),
+        ("act", data.act),
+        ("ctrl", data.ctrl),
+        ("mocap_pos", data.mocap_pos.ravel()),
+        ("mocap_quat", data.mocap_quat.ravel()),
+    ):
+        bad = readiness.first_bad(values)
+        if bad >= 0:
+            raise StateError(f"{what}[{bad}]{_owner(model, what, bad)} is not finite at time {data.time:g} s")
+
+
+def _owner(model: mujoco.MjModel, what: str, index: int) -> str:
+    kinds = mujoco.mjtObj
+    if what == "qpos":
+        joint = int(np.searchsorted(model.jnt_qposadr, index, side="right")) - 1
+        return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, joint)}')"
+    if what == "qvel":
+        return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, int(model.dof_jntid[index]))}')"
+    if what == "ctrl":
+        return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, index)}')"
+    if what == "act":
+        first, count = model.actuator_actadr, model.actuator_actnum
+        actuator = int(np.flatnonzero((first <= index) & (index < first + count))[0])
+        return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, actuator)}')"
+    body = int(np.flatnonzero(model.body_mocapid == index // (3 if what == "mocap_pos" else 4))[0])
+    return f" (mocap body '{name_of(model, kinds.mjOBJ_BODY, body)}')"

@@ -1,0 +1,151 @@
+"""What can be asked of a MuscleSystem after an evaluation: numbers per muscle, and its paths in space."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import coupling, drawing, segments
+from mjwrap.mjcf import Declarations, MuscleDeclaration
+from mjwrap.paths import Status
+from mjwrap.plan import Plan
+from mjwrap.system.state import State
+
+Array = NDArray[np.float64]
+
+
+class Results:
+    """Lengths, velocities, tensions, statuses and paths at the last evaluation.
+
+    declarations: what the model declares, one per muscle; native: muscle actuators that stay with MuJoCo, and why.
+    """
+
+    def __init__(self, found: Declarations, plan: Plan, model: mujoco.MjModel) -> None:
+        self.declarations: list[MuscleDeclaration] = found.muscles
+        self.native: dict[str, str] = found.native
+        self._plan = plan
+        self._last = State(model, plan)
+
+    @property
+    def n(self) -> int:
+        """Number of muscles."""
+        return self._plan.n
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the muscles, in the order of all arrays."""
+        return [muscle.name for muscle in self.declarations]
+
+    @property
+    def length(self) -> Array:
+        """Musculotendon lengths (n,) [m]."""
+        return self._last.length
+
+    @property
+    def velocity(self) -> Array:
+        """Lengthening speeds (n,) [m/s]."""
+        return self._last.velocity
+
+    @property
+    def tension(self) -> Array:
+        """Tensions (n,) [N], never negative."""
+        return self._last.tension
+
+    @property
+    def activation(self) -> Array:
+        """Activations (n,) [-]."""
+        return self._last.activation
+
+    @property
+    def status(self) -> NDArray[np.int64]:
+        """Codes of `mjwrap.Status` (n,)."""
+        return self._last.status
+
+    @property
+    def time(self) -> float:
+        """Simulation time [s] to which all results belong."""
+        return self._last.time
+
+    @property
+    def failures(self) -> NDArray[np.int64]:
+        """Number of steps (n,) at which a muscle's path was not found and its last good force was held."""
+        return self._last.failures
+
+    def index(self, name: str) -> int:
+        """Return the index of a muscle by name; `GeometryError` lists the names where there is no such muscle."""
+        if name not in self.names:
+            raise GeometryError(f"no muscle '{name}'; muscles: {', '.join(self.names) or 'none'}")
+        return self.names.index(name)
+
+    def report(self) -> str:
+        """Return one line per muscle whose path was not found on some steps, with the reason; empty if none."""
+        lines = []
+        for i, count in enumerate(self.failures):
+            if count:
+                reason = Status(int(self._last.last_failure[i])).message
+                lines.append(
+                    f"{self.names[i]}: {count} step{'s' if count != 1 else ''} without a path; at last {reason}"
+                )
+        return "\n".join(lines)
+
+    def _known(self, i: int) -> int:
+        if not 0 <= i < self.n:
+            raise GeometryError(
+                f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}"
+            )
+        return int(i)
+
+    def _polylines(self, spacing: float | None, only: int) -> tuple[Array, NDArray[np.int64]]:
+        if spacing is not None and not (np.isfinite(spacing) and spacing > 0.0):
+            raise GeometryError(f"spacing must be finite and positive [m], not {spacing!r}")
+        state = self._last
+        starts = np.zeros(self.n + 1, dtype=np.int64)
+        given = (self._plan.routes, state.node, state.segments, state.count, state.info)
+        tail = (0.0 if spacing is None else float(spacing), only)
+        out = np.empty((drawing.polylines(*given, *tail, np.empty((0, 3)), starts), 3))
+        drawing.polylines(*given, *tail, out, starts)
+        return out, starts
+
+    def _contacts(self, only: int) -> tuple[Array, NDArray[np.int64]]:
+        state = self._last
+        starts = np.zeros(self.n + 1, dtype=np.int64)
+        given = (self._plan.routes, state.node, state.segments, state.count, only)
+        out = np.empty((drawing.contacts(*given, np.empty((0, 3)), starts), 3))
+        drawing.contacts(*given, out, starts)
+        return out, starts
+
+    def points(self, i: int, spacing: float | None = None) -> Array:
+        """Return the polyline of muscle i, (m, 3), world [m], at the last evaluation; empty before the first.
+
+        spacing [m]: largest distance between points; None: as many as the curvature asks for. Routes joined by
+        pulleys follow one another. A muscle whose path was not found is drawn along the force that it holds.
+        """
+        return self._polylines(spacing, self._known(i))[0]
+
+    def polylines(self, spacing: float | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """Return the polylines of all muscles: points (m, 3), starts (n + 1,); muscle i has starts[i]:starts[i + 1]."""
+        return self._polylines(spacing, -1)
+
+    def contact_points(self, i: int) -> Array:
+        """Return first and last contact point, (k, 2, 3), world [m], of every obstacle that muscle i touches."""
+        return self._contacts(self._known(i))[0].reshape(-1, 2, 3)
+
+    def contacts(self) -> tuple[Array, NDArray[np.int64]]:
+        """Return the contact points of all muscles, P and Q in turn: points (m, 3), starts (n + 1,)."""
+        return self._contacts(-1)
+
+    def forces(self, i: int) -> list[tuple[int, Array, Array]]:
+        """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""
+        state, plan = self._last, self._plan
+        found = []
+        for c in np.flatnonzero(plan.routes[:, coupling.R_MUSCLE] == self._known(i)):
+            pull = state.tension[i] * plan.weights[c]
+            first = int(plan.routes[c, coupling.R_LO]) + int(c)
+            for row in state.segments[first : first + int(state.count[c])]:
+                force = pull * row[segments.G_E : segments.G_E + 3]
+                for column, sign, index in ((segments.G_A, 1.0, row[0]), (segments.G_B, -1.0, row[1])):
+                    body = int(coupling.end_body(plan.routes, plan.links, c, int(index)))
+                    found.append((body, row[column : column + 3].copy(), sign * force))
+        return found

@@ -1,0 +1,38 @@
+"""What belongs to one mjData: warm starts, results, and what was added to its xfrc_applied."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mjwrap.kernels import layout, segments
+from mjwrap.plan import Plan
+
+
+class State:
+    """What belongs to one mjData: warm starts, results, and what was added to its xfrc_applied."""
+
+    def __init__(self, model: mujoco.MjModel, plan: Plan) -> None:
+        n, routes = plan.n, len(plan.routes)
+        self.node = plan.node.copy()
+        self.segments = np.zeros((len(plan.node) + routes, segments.SEGMENT))
+        self.count = np.zeros(routes, dtype=np.int64)
+        self.info = np.zeros((routes, layout.INFO))
+        self.length, self.velocity, self.tension, self.activation = (np.zeros(n) for _ in range(4))
+        self.status = np.zeros(n, dtype=np.int64)
+        self.failures = np.zeros(n, dtype=np.int64)
+        self.last_failure = np.zeros(n, dtype=np.int64)
+        self.own, self.own_now = np.zeros(n), np.zeros(n)
+        self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
+        self.written = np.zeros(model.nbody, dtype=np.bool_)
+        self.scratch = mujoco.MjData(model)
+        self.time = 0.0
+
+    def forget(self) -> None:
+        """Start cold: no branch, no last force, no failures."""
+        self.node[:, layout.S_MODE] = layout.COLD
+        self.count[:] = 0
+        for array in (self.length, self.velocity, self.tension, self.activation, self.own, self.own_now):
+            array[:] = 0.0
+        self.status[:] = 0
+        self.failures[:] = 0
