@@ -56,8 +56,9 @@ def solve_chain(
 
     origin, insertion (3,), positions (n, 3): world [m]; rotations (n, 3, 3): surface to world. start: P (n, 3),
     t (n, 3), s (n,), active (n,) of a path nearby; None is the paper's first guess, with every obstacle touched. An
-    obstacle is dropped when its arc comes out negative and taken in where a straight segment runs below its surface. A
-    path that is not found has `converged` False; `GeometryError` is for input that describes no problem.
+    obstacle is dropped when its arc comes out negative and taken in where a straight segment runs below its surface;
+    options of the method hold for each solve in between. A path that is not found has `converged` False;
+    `GeometryError` is for input that describes no problem.
     """
     solver = make_solver(method, **options)
     scene = Scene(origin, insertion, surfaces, positions, rotations, residual)
@@ -65,22 +66,27 @@ def solve_chain(
     iterations = evaluations = 0
     outcome: Outcome | None = None
     settled = False
+    given_up = np.zeros(scene.n, dtype=bool)
     for _ in range(2 * scene.n + 6):  # drop and take in; a chain that goes on longer is cycling
         before = path.copy()
-        outcome = None
+        solved = True
         if path.active.any():
             outcome = path.solve(scene, solver, tol)
             iterations += outcome.iterations
             evaluations += outcome.evaluations
+            solved = outcome.converged
         lifted = path.active & (path.s < 0.0)
+        if (
+            not solved
+        ):  # perhaps because an obstacle is far from touching; but try to do without each only once
+            lifted &= ~given_up
+            if not lifted.any():
+                break
+            given_up |= lifted
+            path = before
         if lifted.any():
-            if outcome is not None and not outcome.converged:
-                path = before
             path.active = path.active & ~lifted
-            continue
-        if outcome is not None and not outcome.converged:
-            break
-        if not path.touch_down(scene):
+        elif not path.touch_down(scene):
             settled = True
             break
     Q, error = path.contacts(scene)
@@ -96,6 +102,6 @@ def solve_chain(
         iterations=iterations,
         evaluations=evaluations,
         tangency_error=error,
-        residual_error=0.0 if outcome is None else outcome.error,
+        residual_error=outcome.error if outcome is not None and path.active.any() else 0.0,
         converged=settled and error <= tol,
     )

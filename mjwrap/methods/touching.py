@@ -95,6 +95,8 @@ class TouchState:
 
     @classmethod
     def at(cls, scene: Scene, start: Start | None) -> TouchState:
+        if start is None and scene.n == 0:
+            return cls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
         if start is None:
             everything = np.ones(scene.n, dtype=bool)
             problem = scene.problem(everything)
