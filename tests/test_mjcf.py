@@ -137,6 +137,16 @@ def test_a_tendon_that_runs_inside_its_geom_stays_native() -> None:
     assert "inside geom 'elbow' (side site 'elbow_inside' is inside)" in found.native["extensor"]
 
 
+@pytest.mark.parametrize("end", ["origin", "via"])
+@pytest.mark.parametrize("side", ['sidesite="elbow_side"', ""])
+def test_a_tendon_with_an_end_point_inside_its_geom_stays_native(end: str, side: str) -> None:
+    """At the reference pose, that is: MuJoCo goes straight through, and a path round it does not exist."""
+    tendon = EXTENSOR.replace(f'site="{end}"', 'site="elbow_inside"').replace('sidesite="elbow_side"', side)
+    found = read_declarations(compiled(tendon=tendon))
+    assert found.muscles == []
+    assert "no path can go round geom 'elbow': site 'elbow_inside' is inside it" in found.native["extensor"]
+
+
 FIXED = EXTENSOR + '<fixed name="sum"><joint joint="elbow" coef="1"/></fixed>'
 LIMITED = EXTENSOR.replace('"extensor"', '"extensor" actuatorfrcrange="-50 50"')
 CURVES = 'gainprm="0.75 1.05 100 200 0.5 1.6 1.5 1.3 1.2" lengthrange="0.3 0.6"'

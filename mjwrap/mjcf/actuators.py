@@ -6,8 +6,6 @@ these (control limits; gear, length range, acc0) is indexed by `actuator_ctrladr
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import mujoco
 import numpy as np
 
@@ -91,20 +89,31 @@ def native_reason(model: mujoco.MjModel, rest: mujoco.MjData, actuator: int) -> 
 
 
 def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> str | None:
-    """Return which side site lies inside its geom, MuJoCo's sign for a string that runs inside, or None."""
-    for stop, hint in pairwise(tendon_stops(model, tendon)):
-        if stop.kind != "geom" or hint.kind != "hint":
+    """Return which site is inside its geom at the reference pose, or None.
+
+    A side site there is MuJoCo's sign for a string that runs inside; from an end point there no path can go round.
+    """
+    stops = tendon_stops(model, tendon)
+    for k, stop in enumerate(stops):
+        if stop.kind != "geom":
             continue
-        geom, site = stop.index, hint.index
-        local = rest.geom_xmat[geom].reshape(3, 3).T @ (rest.site_xpos[site] - rest.geom_xpos[geom])
-        if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
-            local = local[:2]
-        if np.linalg.norm(local) < model.geom_size[geom, 0] < np.inf:
-            return (
-                f"its tendon runs inside geom '{name_of(model, OBJ.mjOBJ_GEOM, geom)}' "
-                f"(side site '{name_of(model, OBJ.mjOBJ_SITE, site)}' is inside)"
-            )
+        geom = f"geom '{name_of(model, OBJ.mjOBJ_GEOM, stop.index)}'"
+        beside = stops[k + 1] if stops[k + 1].kind == "hint" else None
+        if beside is not None and _is_inside(model, rest, stop.index, beside.index):
+            site = name_of(model, OBJ.mjOBJ_SITE, beside.index)
+            return f"its tendon runs inside {geom} (side site '{site}' is inside)"
+        for end in (stops[k - 1], stops[k + 1] if beside is None else stops[k + 2]):
+            if _is_inside(model, rest, stop.index, end.index):
+                site = name_of(model, OBJ.mjOBJ_SITE, end.index)
+                return f"no path can go round {geom}: site '{site}' is inside it at the reference pose"
     return None
+
+
+def _is_inside(model: mujoco.MjModel, rest: mujoco.MjData, geom: int, site: int) -> bool:
+    local = rest.geom_xmat[geom].reshape(3, 3).T @ (rest.site_xpos[site] - rest.geom_xpos[geom])
+    if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+        local = local[:2]
+    return bool(np.linalg.norm(local) < model.geom_size[geom, 0] < np.inf)
 
 
 def mujoco_law(model: mujoco.MjModel, actuator: int) -> MuJoCoMuscle:
