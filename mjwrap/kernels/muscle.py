@@ -54,7 +54,10 @@ def mujoco_gain_length(x, lmin, lmax):
 
 @jit
 def mujoco_muscle(params, m, activation, length, speed):
-    """MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias` (engine_util_misc.c)."""
+    """MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias` (engine_util_misc.c).
+
+    Where MuJoCo's would push (negative activation, or a force range above zero) there is no tension.
+    """
     gear = params[m, 12]
     range0 = params[m, 0]
     force = params[m, 2]
@@ -83,7 +86,7 @@ def mujoco_muscle(params, m, activation, length, speed):
         z = (x - b) / max(MINVAL, b - 1.0)
         bias = -force * params[m, 7] * (0.5 + z)
     total = min(max(gain * activation + bias, params[m, 13]), params[m, 14])
-    return -gear * total
+    return max(-gear * total, 0.0)
 
 
 # ------------------------------------------------------------------ De Groote-Fregly 2016, rigid tendon
