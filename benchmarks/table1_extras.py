@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -59,11 +59,21 @@ def two_cylinders(repeats: int) -> tuple[list[TwoRow], Array]:
         int(sweep.evaluations.sum()),
         float(np.median(taken)),
         int((sweep.status != mw.Status.CONVERGED).sum()),
-        rows[-1].touched,
+        _newton_touched(obstacles, pos),
         float(sweep.tangency_error.max()),
         0.0,
     )
     return [*rows, newton], sweep.length
+
+
+def _newton_touched(obstacles: list[mw.Obstacle], pos: Array) -> list[int]:
+    touched = np.zeros(2, dtype=int)
+    sol = None
+    for centres in pos:
+        here = [replace(o, pos=tuple(c)) for o, c in zip(obstacles, centres.tolist(), strict=True)]
+        sol = mw.solve_path(paper.ORIGIN, paper.INSERTION, here, start=sol)
+        touched += [contact.active for contact in sol.contacts]
+    return touched.tolist()
 
 
 def _two_row(label: str, method: str, options: dict[str, Any], pos: Array, lengths: Array) -> TwoRow:
