@@ -309,6 +309,19 @@ def test_an_end_point_inside_has_a_status_and_a_finite_length(surface: mw.Cylind
     assert back.length == pytest.approx(start.length, rel=EXACT)
 
 
+def test_length_and_force_are_continuous_where_an_end_point_comes_to_lie_on_the_surface() -> None:
+    row = [mw.Obstacle(mw.Cylinder(1.0))]
+    at = mw.solve_path((1.0, 0.0, -2.5), (-2, 0.3, -0.5), row)
+    assert at.converged
+    for gap in (1e-14, 1e-12, 1e-10, 1e-8, 1e-6):
+        near = mw.solve_path((1.0 + gap, 0.0, -2.5), (-2, 0.3, -0.5), row)
+        assert near.converged
+        assert near.length == pytest.approx(at.length, abs=2.0 * gap)
+        assert np.abs(near.wrenches(1.0) - at.wrenches(1.0)).max() < 10.0 * np.sqrt(
+            gap
+        )  # a tangent of length sqrt(2 gap)
+
+
 def test_a_sweep_goes_on_after_poses_without_a_path() -> None:
     x = np.concatenate([np.linspace(2, 0.5, 30), np.linspace(0.5, 2, 30)])
     origin = np.stack([x, np.full(60, 0.1), np.zeros(60)], axis=1)

@@ -261,8 +261,8 @@ def take_back(xfrc, others, mine, total, written):
     """Leave in xfrc_applied (nbody, 6) what others put there.
 
     Rows still as mjwrap wrote them get others' share back to the bit. Where a row was set to zero since then (a reset,
-    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back. From rows
-    that others have changed otherwise, mjwrap's last contribution is subtracted.
+    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back. From
+    rows that others have changed otherwise, mjwrap's last contribution is subtracted.
     """
     cleared, untouched = False, False
     for b in range(xfrc.shape[0]):

@@ -21,6 +21,7 @@ KIND, DIM, POS, ROT, HINT = lay.KIND, lay.DIM, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
 
 INSIDE = 1.0 - 1e-9  # a point closer to the axis than this share of the radius is inside
+ON_SURFACE = 2e-9  # a straight segment shorter than this share of the radius ends on the surface, no tangent is shorter
 CLEAR = 1e-12  # a wrap that would bend the string by less [rad] counts as not touching
 TWO_PI = 2.0 * math.pi
 A_INSIDE = 1

@@ -11,6 +11,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.direct import ON_SURFACE
 from mjwrap.kernels.geodesics import displace, geodesic
 
 S_MODE, S_P, S_ARC = lay.S_MODE, lay.S_P, lay.S_ARC
@@ -25,7 +26,7 @@ MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in radii
 MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in radii
 MAX_HALVINGS = 6
-SHORTEST = 1e-300  # keeps the reciprocal of a vanishing segment finite [m]
+SHORTEST = 1e-150  # keeps the reciprocal of a vanishing segment finite [m]
 
 
 @jit
@@ -45,6 +46,11 @@ def _leave(j, ex, ey, ez, size, node):
     node[j, W_EQ + 1] = ey
     node[j, W_EQ + 2] = ez
     node[j, W_LQ] = size
+    if size <= ON_SURFACE * node[j, DIM]:
+        node[j, W_CQ] = 1.0
+        node[j, W_CQ + 1] = 0.0
+        node[j, W_CQ + 2] = 0.0
+        return 0.0
     along = _dot(node, j, W_EQ, j, W_TQ)
     normal = _dot(node, j, W_EQ, j, W_NQ)
     binormal = _dot(node, j, W_EQ, j, W_BQ)
@@ -58,6 +64,7 @@ def _leave(j, ex, ey, ez, size, node):
 def evaluate(lo, hi, ends, node):
     """Evaluate all touched obstacles of nodes lo..hi and the straight segments between; return ||f||^2.
 
+    Where an end point lies on a surface there is no straight segment whose direction could differ from t.
     ends = (base x, y, z, A x, y, z, B x, y, z): A and B relative to the base point [m].
     """
     gx, gy, gz, x, y, z, bx, by, bz = ends
@@ -75,9 +82,11 @@ def evaluate(lo, hi, ends, node):
         node[k, W_E + 1] = dy
         node[k, W_E + 2] = dz
         node[k, W_L] = size
-        along = _dot(node, k, W_E, k, W_TP)
-        normal = _dot(node, k, W_E, k, W_NP)
-        binormal = _dot(node, k, W_E, k, W_BP)
+        along, normal, binormal = 1.0, 0.0, 0.0
+        if size > ON_SURFACE * node[k, DIM]:
+            along = _dot(node, k, W_E, k, W_TP)
+            normal = _dot(node, k, W_E, k, W_NP)
+            binormal = _dot(node, k, W_E, k, W_BP)
         node[k, W_CP] = along
         node[k, W_CP + 1] = normal
         node[k, W_CP + 2] = binormal

@@ -2,7 +2,7 @@
 
 Each end of a straight segment is a material point of some body at this instant. The list `seg` names them: one row per
 segment with near and far node (the chain's origin is lo - 1, its insertion hi), near point, far point and the unit
-vector e from near to far, in the world frame.
+vector e from near to far, in the world frame. A segment that vanishes on a surface has the geodesic's direction there.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.direct import ON_SURFACE
 
 G_NEAR = 0
 G_FAR = 1
@@ -19,7 +20,7 @@ G_B = 5  # far point (3) [m]
 G_E = 8  # unit vector (3)
 SEGMENT = 11
 
-VANISHING = 1e-13  # a shorter segment takes its direction from the geodesic beside it [m]
+VANISHING = 1e-200  # a segment between two points has a direction above this length [m]
 
 
 @jit
@@ -40,12 +41,12 @@ def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
             px, py, pz = ix - ox, iy - oy, iz - oz
         ex, ey, ez = px - x, py - y, pz - z
         size = math.sqrt(ex * ex + ey * ey + ez * ez)
-        if size > VANISHING:
-            ex, ey, ez = ex / size, ey / size, ez / size
-        elif k < hi and node[k, lay.KIND] != lay.VIA:
+        if k < hi and node[k, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[k, lay.DIM]:
             ex, ey, ez = node[k, lay.W_TP], node[k, lay.W_TP + 1], node[k, lay.W_TP + 2]
-        elif near >= lo and node[near, lay.KIND] != lay.VIA:
+        elif near >= lo and node[near, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[near, lay.DIM]:
             ex, ey, ez = node[near, lay.W_TQ], node[near, lay.W_TQ + 1], node[near, lay.W_TQ + 2]
+        elif size > VANISHING:
+            ex, ey, ez = ex / size, ey / size, ez / size
         else:
             ex, ey, ez = 0.0, 0.0, 0.0
         seg[count, G_NEAR] = near

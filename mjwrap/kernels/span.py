@@ -130,8 +130,9 @@ def _end_inside(lo, hi, ends, node):
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
-    ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved
-    solution and leaves the new one in its place. With `direct` a single obstacle is wrapped in closed form whatever is saved but its branch.
+    ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
+    leaves the new one in its place. With `direct` a single obstacle is wrapped in closed form whatever is saved but
+    its branch.
     """
     iterations, evaluations, repairs = 0, 0, 0
     error = 0.0
