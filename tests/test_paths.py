@@ -319,7 +319,7 @@ def test_length_and_force_are_continuous_where_an_end_point_comes_to_lie_on_the_
         assert near.length == pytest.approx(at.length, abs=2.0 * gap)
         assert np.abs(near.wrenches(1.0) - at.wrenches(1.0)).max() < 10.0 * np.sqrt(
             gap
-        )  # a tangent of length sqrt(2 gap)
+        )  # tangent: sqrt(2 gap)
 
 
 def test_a_sweep_goes_on_after_poses_without_a_path() -> None:
