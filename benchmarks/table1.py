@@ -116,9 +116,9 @@ def _print_two(rows: list[TwoRow]) -> None:
             f"{row.tangency_error:>10.1e}{row.length_difference:>17.1e}"
         )
     print(f"{'paper, BR':16}{n_i:>7,}{i_a:>6}{n_f:>9,}{seconds:>11}   (its own radii and end points)")
-    print(
-        f"touched: first cylinder {rows[0].touched[0]} poses, second {rows[0].touched[1]}, with every method"
-    )
+    patterns = {tuple(row.touched) for row in rows}
+    touched = " or ".join(f"{first} and {second}" for first, second in sorted(patterns))
+    print(f"touched: the first and the second cylinder at {touched} poses, over all methods")
 
 
 def _print_folds(folds: list[Fold]) -> None:
