@@ -23,6 +23,8 @@ import paper_scenes as paper
 from table1_extras import Fold, TwoRow, fold, two_cylinders
 from table1_runs import Rates, Row, paper_row, production_row, rates
 
+import mjwrap as mw
+
 COUNTS = """\
 n_f counts every evaluation of the residual over the whole path at one set of unknowns, those of finite differences,
 line searches and first guesses included; mjwrap's evaluates the analytic Jacobian along with it and counts both as
@@ -181,20 +183,14 @@ def _replace(path: Path, write: Any) -> None:
 
 
 def _machine() -> dict[str, Any]:
-    packages = ("numpy", "scipy", "numba", "mjwrap")
+    packages = ("numpy", "scipy", "numba")
     return {
         "python": platform.python_version(),
         "processor": platform.processor() or platform.machine(),
         "cpus": os.cpu_count(),
-        **{name: _version(name) for name in packages},
+        "mjwrap": mw.__version__,
+        **{name: version(name) for name in packages},
     }
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except ImportError:
-        return "not installed"
 
 
 def _json(
