@@ -136,11 +136,11 @@ def start_state(model: mujoco.MjModel, key: int, positions: Sequence[str]) -> mu
 
 def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:
     """Return the id of a hinge or slide."""
-    single = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     fit = {
         name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j): j
         for j in range(model.njnt)
-        if model.jnt_type[j] in single
+        if int(model.jnt_type[j]) in single
     }
     if name not in fit:
         raise UserError(f"'{entry}': no hinge or slide '{name}'; there are: {', '.join(fit) or 'none'}")

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from _common import Output
 from _history import History
+from matplotlib.colors import Normalize, PowerNorm
 from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
@@ -36,15 +37,16 @@ def plot_run(
     time = history.time
     for axis, panel in zip(axes[:, 0], panels, strict=False):
         if panel == "turns":
-            _lines(axis, time, {name: np.degrees(x) for name, x in turns.items()}, "joints [°]")
+            _lines(axis, time, {name: np.degrees(x) for name, x in turns.items()}, "joints [°]", many)
         elif panel == "slides":
-            _lines(axis, time, {name: 1e3 * x for name, x in slides.items()}, "joints [mm]")
+            _lines(axis, time, {name: 1e3 * x for name, x in slides.items()}, "joints [mm]", many)
         else:
             _muscle_panel(figure, axis, time, panel, muscles, history, many)
-    if left_out:
-        axes[0, 0].set_title(
-            f"{left_out} joints that move less are left out", fontsize=8, loc="right", color="0.4"
-        )
+    notes = [f"{left_out} joints that move less are left out"] if left_out else []
+    if muscles.failures.any():
+        failed = [name for name, count in zip(muscles.names, muscles.failures, strict=True) if count]
+        notes.append(f"paths not found at some steps: {'in red' if many else ', '.join(failed)}")
+    figure.supxlabel("; ".join(notes), fontsize=8, color="0.4")
     axes[-1, 0].set_xlabel("time [s]")
     axes[-1, 0].set_xlim(time[0], max(time[-1], time[0] + 1e-9))
     figure.suptitle(title, fontsize=11)
@@ -76,8 +78,8 @@ def _joints(model: mujoco.MjModel, qpos: Array) -> tuple[dict[str, Array], dict[
     return turns, slides, count - len(turns) - len(slides)
 
 
-def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str) -> None:
-    """Draw named curves, with a legend outside."""
+def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str, wide: bool = False) -> None:
+    """Draw named curves, with a legend at the right or, over `wide` panels, on top."""
     colours = plt.get_cmap("tab10").colors  # pyright: ignore[reportAttributeAccessIssue]
     for k, (name, curve) in enumerate(curves.items()):
         axis.plot(
@@ -85,7 +87,10 @@ def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str) -> None
         )
     axis.set_ylabel(label)
     axis.grid(alpha=0.25)
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+    if wide:  # colour bars take the place at the right
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, fontsize=7.5, frameon=False)
+    else:
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
 
 
 def _muscle_panel(
@@ -103,12 +108,18 @@ def _muscle_panel(
     if panel == "length":  # each muscle against its own first length: they differ tenfold
         values, label = values - values[0], "length, change since the start [mm]"
     top = float(np.abs(values).max()) or 1.0
-    span = (-top, top) if panel == "length" else (0.0, 1.0 if panel == "activation" else top)
+    norm = {
+        "activation": Normalize(0.0, 1.0),
+        "length": Normalize(-top, top),
+        "tension": PowerNorm(0.5, 0.0, top),  # so that small muscles are seen beside large ones
+    }[panel]
     colours = "RdBu_r" if panel == "length" else "viridis"
     edges = np.append(time, time[-1] + (time[-1] - time[-2] if len(time) > 1 else 1e-3))
     picture = axis.pcolormesh(
-        edges, np.arange(muscles.n + 1), values.T, cmap=colours, vmin=span[0], vmax=span[1], rasterized=True
+        edges, np.arange(muscles.n + 1), values.T, cmap=colours, norm=norm, rasterized=True
     )
     axis.set_yticks(np.arange(muscles.n) + 0.5, muscles.names, fontsize=6.5)
+    for tick, failures in zip(axis.get_yticklabels(), muscles.failures, strict=True):
+        tick.set_color("red" if failures else "black")
     axis.invert_yaxis()
     figure.colorbar(picture, ax=axis, label=label, pad=0.01, aspect=30)

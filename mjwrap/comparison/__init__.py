@@ -9,6 +9,7 @@ from __future__ import annotations
 from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.motion import MotionDifference, compare_motion, with_native_laws
 from mjwrap.comparison.run import PoseComparison, compare_poses
+from mjwrap.comparison.sentences import Verdict, verdict
 from mjwrap.comparison.verdict import AGREE, MuscleSummary, Outcome
 
 __all__ = [
@@ -18,7 +19,9 @@ __all__ = [
     "MuscleSummary",
     "Outcome",
     "PoseComparison",
+    "Verdict",
     "compare_motion",
     "compare_poses",
+    "verdict",
     "with_native_laws",
 ]

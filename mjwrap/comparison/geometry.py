@@ -61,12 +61,14 @@ class Judgement(NamedTuple):
 
     turn is the angle [rad] by which the path goes round a cylinder's axis, counter-clockwise positive. Two paths
     between the same points are on the same branch if it is the same; else it differs by whole turns. On a sphere: zero.
+    middle (T, 3): from the centre or axis to the middle of the arc, or to the nearest point of a straight path.
     """
 
     fault: Ints
     measure: Array
     arc: Array
     turn: Array
+    middle: Array
 
 
 def _norm(v: Array) -> Array:
@@ -84,10 +86,15 @@ def _radial(v: Array, cylinder: bool) -> Array:
 
 def clearance(a: Array, b: Array, cylinder: bool) -> Array:
     """Return the least distance (T,) of the straight segments ab from the axis or centre [m]."""
+    return _norm(nearest(a, b, cylinder))
+
+
+def nearest(a: Array, b: Array, cylinder: bool) -> Array:
+    """Return the vectors (T, 3) from the axis or centre to the nearest points of the straight segments ab [m]."""
     start, step = _radial(a, cylinder), _radial(b - a, cylinder)
     square = _dot(step, step)
     place = np.clip(-_dot(start, step) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    return _norm(start + place[:, None] * step)
+    return start + place[:, None] * step
 
 
 def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array) -> Judgement:
@@ -95,8 +102,9 @@ def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: 
     with np.errstate(invalid="ignore", divide="ignore"):
         straight = _judge_straight(cylinder, radius, a, b)
         wrapped = _judge_wrapped(cylinder, radius, a, b, p, q)
-        parts = (np.where(touched, w, s) for w, s in zip(wrapped, straight, strict=True))
+        parts = (np.where(touched, w, s) for w, s in zip(wrapped[:4], straight[:4], strict=True))
         fault, measure, arc, turn = parts
+        middle = np.where(touched[:, None], wrapped[4], straight[4])
         inside = radius - np.minimum(_norm(_radial(a, cylinder)), _norm(_radial(b, cylinder)))
         for here, name, size in (
             ((inside > DEPTH * radius) & (fault != Fault.INSIDE), Fault.ENDPOINT_INSIDE, inside),
@@ -107,17 +115,18 @@ def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: 
             ),
         ):
             fault, measure = np.where(here, name, fault), np.where(here, size, measure)
-    return Judgement(fault.astype(np.int64), measure, arc, turn)
+    return Judgement(fault.astype(np.int64), measure, arc, turn, middle)
 
 
-def _judge_straight(cylinder: bool, radius: float, a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
-    depth = radius - clearance(a, b, cylinder)
+def _judge_straight(cylinder: bool, radius: float, a: Array, b: Array) -> tuple[Array, ...]:
+    middle = nearest(a, b, cylinder)
+    depth = radius - _norm(middle)
     fault = np.where(depth > DEPTH * radius, Fault.THROUGH, Fault.NONE)
     turn = np.zeros(len(a))
     if cylinder:
         cross, dot = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]
         turn = np.arctan2(cross, dot)
-    return fault.astype(np.float64), depth, np.zeros(len(a)), turn
+    return fault.astype(np.float64), depth, np.zeros(len(a)), turn, middle
 
 
 def _judge_wrapped(
@@ -158,7 +167,9 @@ def _judge_wrapped(
     ):
         fault, measure = np.where(here, name, fault), np.where(here, size, measure)
     turn = np.where(np.signbit(angle) ^ back[:, 0], -swept, swept) if cylinder else np.zeros(len(a))
-    return fault, measure, arc, turn
+    half = 0.5 * angle[:, None]
+    round_p = np.stack([-n[:, 1], n[:, 0], np.zeros(len(a))], axis=1) if cylinder else t
+    return fault, measure, arc, turn, radius * (np.cos(half) * n + np.sin(half) * round_p)
 
 
 def _once_round(angle: Array) -> Array:

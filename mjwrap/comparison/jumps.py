@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,11 @@ MOST = 3  # intervals looked into, for each muscle, sweep and kind
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump of one program's path: where, by how much [m, m/rad], and what the path was before and after."""
+    """A jump of one program's path: where, by how much [m, m/rad], and what the path was before and after.
+
+    base: the number of the pose around which the joint was swept; other_smooth: whether the other program had a path
+    there that did not jump.
+    """
 
     program: str
     muscle: str
@@ -35,6 +39,8 @@ class Jump:
     slope: float
     before: str
     after: str
+    base: int = 0
+    other_smooth: bool = False
 
 
 def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, axis: int = 0) -> list[Jump]:
@@ -58,8 +64,20 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
                     continue
                 seen.append(jump[0])
                 before, after = _sides(comparer, twin, program, place, jump[0], float(np.ptp(motion.at)))
-                found.append(Jump(program, twin.name, motion.name, *jump, before, after))
-    return found
+                found.append(Jump(program, twin.name, motion.name, *jump, before, after, motion.base))
+    return [_beside(jump, found, batch) for jump in found]
+
+
+def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
+    """Note whether the other program was smooth where this one jumps."""
+    (twin,) = (twin for twin in batch.twins if twin.name == jump.muscle)
+    k = int(np.clip(np.searchsorted(batch.motion.at, jump.at), 1, len(batch.motion.at) - 1))
+    jumps_too = any(
+        other.program != jump.program and other.muscle == jump.muscle and abs(other.at - jump.at) < 1e-6
+        for other in found
+    )
+    has_path = twin.mjwrap is not None and not twin.status[k - 1 : k + 1].any()
+    return replace(jump, other_smooth=has_path and not jumps_too)
 
 
 def _candidates(motion: Motion, record: PathRecord, good: NDArray[np.bool_]) -> list[int]:

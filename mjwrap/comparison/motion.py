@@ -27,7 +27,9 @@ _UNSTABLE = (
 class MotionDifference:
     """Both runs: time (T,), qpos (T, nq) of each, and their difference (T, nv), mjwrap minus MuJoCo, by dof names.
 
-    stopped: why a run ended early, or empty.
+    places (nv,): the entry of qpos that shows a dof (for balls and free joints, the joint's first);
+    stopped: why a run ended early, or empty; paths:
+    mjwrap's report of muscles whose path was not found.
     """
 
     time: Array
@@ -35,7 +37,9 @@ class MotionDifference:
     mjwrap: Array
     difference: Array
     dofs: list[str]
+    places: list[int]
     stopped: str = ""
+    paths: str = ""
 
     def worst(self) -> tuple[str, float, float]:
         """Return the dof that differs most, by how much [m or rad], and when [s]."""
@@ -130,7 +134,12 @@ def compare_motion(
     gap = np.zeros((len(times), model.nv))
     for row, a, b in zip(gap, theirs, ours, strict=True):
         mujoco.mj_differentiatePos(model, row, 1.0, a, b)
-    return MotionDifference(np.array(times), np.array(theirs), np.array(ours), gap, dof_names(model), stopped)
+    runs = np.array(times), np.array(theirs), np.array(ours)
+    return MotionDifference(*runs, gap, dof_names(model), _places(model), stopped, muscles.report())
+
+
+def _places(model: mujoco.MjModel) -> list[int]:
+    return [int(model.jnt_qposadr[int(model.dof_jntid[d])]) for d in range(model.nv)]
 
 
 def dof_names(model: mujoco.MjModel) -> list[str]:

@@ -21,7 +21,8 @@ class Motion:
     """Poses to evaluate in order.
 
     name: a joint's, or "random poses"; at (T,): the joint's position [m or rad], or a running number; qpos (T, nq);
-    tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether one pose leads to the next.
+    tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether one pose leads to the next;
+    base: the number of the pose around which a joint is swept.
     """
 
     name: str
@@ -30,14 +31,16 @@ class Motion:
     tangent: Array
     qvel: Array
     continuous: bool
+    base: int = 0
 
 
 class PoseMaker:
     """Makes poses of a model around a base pose qpos (nq,)."""
 
-    def __init__(self, model: mujoco.MjModel, base: Array, seed: int = 0) -> None:
+    def __init__(self, model: mujoco.MjModel, base: Array, seed: int = 0, number: int = 0) -> None:
         self.model = model
         self.base = np.array(base, dtype=np.float64)
+        self.number = number
         self.rng = np.random.default_rng(seed)
         self._couplings = self._read_couplings()
 
@@ -124,7 +127,7 @@ class PoseMaker:
         if int(self.model.jnt_type[joint]) == _BALL:
             name = f"{name} ({'xyz'[axis]})"
         qpos, tangent = (np.array(part) for part in zip(*pairs, strict=True))
-        return Motion(name, at, qpos, tangent, self._velocities(samples), True)
+        return Motion(name, at, qpos, tangent, self._velocities(samples), True, self.number)
 
     def maker(self, joint: int, axis: int = 0) -> Callable[[float], tuple[Array, Array]]:
         """Return the function value -> (pose, tangent) of a sweep, for a closer look between its samples."""

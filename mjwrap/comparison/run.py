@@ -73,7 +73,7 @@ def compare_poses(
     if len(joints) > 1 and bases > 0:
         middle = makers[0].middle()
         others = makers[0].random(bases).qpos[1:]
-        makers += [PoseMaker(model, pose, seed + 1 + i) for i, pose in enumerate((middle, *others))]
+        makers += [PoseMaker(model, pose, seed + i, i) for i, pose in enumerate((middle, *others), 1)]
     plan = [(maker, joint, axis) for maker in makers for joint in joints for axis in maker.axes(joint)]
 
     def take(batch: Batch) -> None:

@@ -26,7 +26,8 @@ class PathRecord:
     """One program's path of one muscle over a motion, (T,) each, and its judgement.
 
     length [m], velocity [m/s], jacobian (T, nv) ∂l/∂q; fault: `Fault` of the worst span, measure, span: which one;
-    turns (T, spans) [rad]: the branch, see `geometry.Judgement`; touched (T, spans).
+    turns (T, spans) [rad]: the branch, see `geometry.Judgement`; touched (T, spans);
+    hinted (T, spans): whether it passes a cylinder on the side of its side site, or there is none.
     """
 
     length: Array
@@ -37,6 +38,7 @@ class PathRecord:
     span: Ints
     turns: Array
     touched: NDArray[np.bool_]
+    hinted: NDArray[np.bool_]
 
 
 class _Pair(NamedTuple):
@@ -122,7 +124,7 @@ class Comparer:
         native, mine = _Numbers(count, self.model.ntendon, nv), _Numbers(count, self.muscles.n, nv)
         wraps = WrapRecord(self.model, count)
         contacts: list[dict[int, Array]] = []
-        geoms = np.zeros((count, self.model.ngeom, 3)), np.zeros((count, self.model.ngeom, 3, 3))
+        geoms = _Frames(count, self.model)
         taken = [pair.index for pair in self._pairs if pair.index >= 0]
         self.muscles.reset(self.data)
         if motion.continuous and start is not None:
@@ -130,10 +132,7 @@ class Comparer:
         for k in range(count):
             native.keep(k, *self.native_at(motion.qpos[k], motion.qvel[k]))
             wraps.keep(k, self._native_data)
-            geoms[0][k], geoms[1][k] = (
-                self._native_data.geom_xpos,
-                self._native_data.geom_xmat.reshape(-1, 3, 3),
-            )
+            geoms.keep(k, self._native_data)
             if not motion.continuous:
                 self.muscles.reset(self.data)
             mine.keep(k, *self.mjwrap_at(motion.qpos[k], motion.qvel[k]))
@@ -179,12 +178,12 @@ class Comparer:
         return muscles.length.copy(), muscles.velocity.copy(), jacobian, muscles.status.copy()
 
     def _record(
-        self, spans: list[Span], points: list[SpanPoints], geoms: tuple[Array, Array],
+        self, spans: list[Span], points: list[SpanPoints], geoms: _Frames,
         length: Array, velocity: Array, jacobian: Array,
     ) -> PathRecord:  # fmt: skip
         count = len(length)
         fault, measure, worst = np.zeros(count, dtype=np.int64), np.zeros(count), np.full(count, -1)
-        turns = np.zeros((count, len(spans)))
+        turns, hinted = np.zeros((count, len(spans))), np.ones((count, len(spans)), dtype=np.bool_)
         total = np.zeros(count)
         for s, (span, at) in enumerate(zip(spans, points, strict=True)):
             straight = np.where(
@@ -196,6 +195,9 @@ class Comparer:
             if span.geom >= 0:
                 found = judge(*_in_frame(self.model, span.geom, geoms, at))
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
+                if span.hint >= 0:
+                    side = geoms.local(span.geom, geoms.sites[:, span.hint])
+                    hinted[:, s] = np.einsum("ti,ti->t", found.middle[:, :2], side[:, :2]) > 0.0
                 new = (found.fault > 0) & (fault == 0)
                 fault[new], measure[new], worst[new] = found.fault[new], found.measure[new], s
             total += span.weight * (straight + arc)
@@ -203,7 +205,24 @@ class Comparer:
         new = (fault == 0) & ~(off <= LENGTH)
         fault[new], measure[new] = Fault.WRONG_LENGTH, off[new]
         touched = np.stack([at.touched for at in points], axis=1)
-        return PathRecord(length, velocity, jacobian, fault, measure, worst, turns, touched)
+        return PathRecord(length, velocity, jacobian, fault, measure, worst, turns, touched, hinted)
+
+
+class _Frames:
+    """Where geoms and sites were, over `count` poses: centre (T, ngeom, 3), rotation (T, ngeom, 3, 3), sites."""
+
+    def __init__(self, count: int, model: mujoco.MjModel) -> None:
+        self.centre, self.rotation = np.zeros((count, model.ngeom, 3)), np.zeros((count, model.ngeom, 3, 3))
+        self.sites = np.zeros((count, model.nsite, 3))
+
+    def keep(self, k: int, data: mujoco.MjData) -> None:
+        """Keep pose k."""
+        self.centre[k], self.rotation[k] = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
+        self.sites[k] = data.site_xpos
+
+    def local(self, geom: int, points: Array) -> Array:
+        """Return world points (T, 3) in a geom's frame."""
+        return np.einsum("tji,tj->ti", self.rotation[:, geom], points - self.centre[:, geom])
 
 
 class _Numbers:
@@ -232,11 +251,10 @@ def _sparse(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.int3
 
 
 def _in_frame(
-    model: mujoco.MjModel, geom: int, geoms: tuple[Array, Array], at: SpanPoints
+    model: mujoco.MjModel, geom: int, geoms: _Frames, at: SpanPoints
 ) -> tuple[bool, float, Array, Array, NDArray[np.bool_], Array, Array]:
     """Return what `judge` asks for: kind, radius, and the points in the geom's frame."""
-    centre, rotation = geoms[0][:, geom], geoms[1][:, geom]
-    a, b, p, q = (np.einsum("tji,tj->ti", rotation, x - centre) for x in (at.a, at.b, at.p, at.q))
+    a, b, p, q = (geoms.local(geom, x) for x in (at.a, at.b, at.p, at.q))
     cylinder = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
     return cylinder, float(model.geom_size[geom, 0]), a, b, at.touched, p, q
 
@@ -253,7 +271,7 @@ def _assign(
     own: list[SpanPoints],
     pairs: list[Array],
     model: mujoco.MjModel,
-    geoms: tuple[Array, Array],
+    geoms: _Frames,
 ) -> None:
     """Give every contact pair (k, 2, 3) of mjwrap to the span that it fits best, in order."""
     for t, contacts in enumerate(pairs):
@@ -264,13 +282,11 @@ def _assign(
             free = [f for f in free if f > s]
 
 
-def _misfit(
-    span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geoms: tuple[Array, Array], t: int
-) -> float:
+def _misfit(span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geoms: _Frames, t: int) -> float:
     """Return how far two contact points are off a span's surface and tangents [m]."""
     rotation, centre, radius = (
-        geoms[1][t, span.geom],
-        geoms[0][t, span.geom],
+        geoms.rotation[t, span.geom],
+        geoms.centre[t, span.geom],
         float(model.geom_size[span.geom, 0]),
     )
     misfit = 0.0

@@ -30,13 +30,16 @@ class Outcome(enum.IntEnum):
     MJWRAP_FAILED = 4  # mjwrap found none where MuJoCo's path is a true geodesic
     MJWRAP_WRONG = 5  # mjwrap's path is not a true geodesic
     UNEXPLAINED = 6  # both are judged the same true geodesic, and their numbers differ
+    WRONG_SIDE = (
+        7  # from a cold start mjwrap passes a cylinder on the side away from its hint, MuJoCo does not
+    )
 
 
-MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED)
+MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED, Outcome.WRONG_SIDE)
 
 
-def outcomes(twin: Twin) -> NDArray[np.int64]:
-    """Return the `Outcome` (T,) of a muscle that both programs have."""
+def outcomes(twin: Twin, continuous: bool) -> NDArray[np.int64]:
+    """Return the `Outcome` (T,) of a muscle that both programs have; continuous: whether mjwrap keeps its branch."""
     native, mine = twin.native, twin.mjwrap
     assert mine is not None
     count = len(native.length)
@@ -46,6 +49,7 @@ def outcomes(twin: Twin) -> NDArray[np.int64]:
     for here, outcome in (  # the last that holds counts
         (near & same, Outcome.AGREE),
         (~same, Outcome.OTHER_BRANCH),
+        (~same & (not continuous) & (native.hinted & ~mine.hinted).any(axis=1), Outcome.WRONG_SIDE),
         (native.fault != 0, Outcome.MUJOCO_NOT_GEODESIC),
         (mine.fault != 0, Outcome.MJWRAP_WRONG),
         ((twin.status != 0) & (native.fault == 0), Outcome.MJWRAP_FAILED),
@@ -85,6 +89,7 @@ class Curves:
     length: Array | None
     slope: Array | None
     failed: NDArray[np.bool_]
+    base: int = 0
 
 
 @dataclass
@@ -126,7 +131,7 @@ class MuscleSummary:
         if mine is None:
             self._keep_curves(motion, twin, 0.0)
             return
-        found = outcomes(twin)
+        found = outcomes(twin, motion.continuous)
         self.counts.update(Outcome(int(o)).name for o in found)
         self.statuses.update(Status(int(s)).message for s in twin.status[twin.status != 0])
         wrong = found == Outcome.MJWRAP_WRONG
@@ -184,6 +189,7 @@ class MuscleSummary:
         self.curves = Curves(
             motion.name, motion.at, twin.native.length, slope(twin.native, motion),
             None if mine is None else mine.length, None if mine is None else slope(mine, motion), twin.status != 0,
+            motion.base,
         )  # fmt: skip
 
     _score: tuple[float, float] = (0.0, 0.0)

@@ -1,0 +1,102 @@
+"""The verdict on each muscle in a sentence: which of the two is right, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.jumps import Jump
+from mjwrap.comparison.verdict import MuscleSummary, Outcome
+
+
+class Verdict(NamedTuple):
+    """right: "both", "mjwrap", "MuJoCo", "neither" or "-" (nothing to compare); why: in words."""
+
+    right: str
+    why: str
+
+
+def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
+    """Return the verdict on a muscle from its summary and its own jumps."""
+    if summary.native_only:
+        seen = _native_faults(summary, summary.poses, set(Fault))
+        told = "; ".join(part for part in (seen, _jumps(jumps, "MuJoCo")) if part)
+        return Verdict("-", f"stays with MuJoCo: {summary.native_only}" + (f". There {told}" if told else ""))
+    counts, poses = summary.counts, summary.poses
+    own_jumps, native_jumps = _jumps(jumps, "mjwrap"), _jumps(jumps, "MuJoCo")
+    if summary.at_fault or own_jumps:
+        return Verdict("MuJoCo", "; ".join(part for part in (_own_faults(summary), own_jumps) if part))
+    no_path = counts[Outcome.NO_PATH.name]
+    if no_path == poses:
+        return Verdict("neither", _native_faults(summary, poses, {Fault.ENDPOINT_INSIDE}))
+    parts = []
+    if counts[Outcome.MUJOCO_NOT_GEODESIC.name]:
+        parts.append(_native_faults(summary, poses, set(Fault) - {Fault.ENDPOINT_INSIDE}))
+    if native_jumps:
+        smooth = all(jump.other_smooth for jump in jumps if jump.program == "MuJoCo")
+        parts.append(
+            f"{native_jumps}, where mjwrap's path {'goes on smoothly' if smooth else 'goes on or ends'}"
+        )
+    if counts[Outcome.OTHER_BRANCH.name]:
+        longer = "longer" if summary.longer_branch > 0.0 else "shorter"
+        parts.append(
+            f"at {counts[Outcome.OTHER_BRANCH.name]} of {poses} poses the two go round the cylinder another way, each "
+            f"a true geodesic (mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer})"
+        )
+    right = "mjwrap" if counts[Outcome.MUJOCO_NOT_GEODESIC.name] or native_jumps else "both"
+    if counts[Outcome.AGREE.name]:
+        length, velocity, arm = summary.agreement
+        parts.append(
+            f"equal at {counts[Outcome.AGREE.name]} of {poses} poses, to {length:.0e} m, {velocity:.0e} m/s, "
+            f"{arm:.0e} m/rad"
+        )
+    if no_path:
+        inside = _native_faults(summary, poses, {Fault.ENDPOINT_INSIDE})
+        parts.append(inside or f"at {no_path} of {poses} poses neither has a geodesic path")
+    return Verdict(right, "; ".join(parts))
+
+
+def _native_faults(summary: MuscleSummary, poses: int, kinds: set[Fault]) -> str:
+    """Say what was wrong with MuJoCo's path, by kind and geom."""
+    told = []
+    for (fault, geom), count in summary.faults.most_common():
+        if fault in kinds:
+            at = f" (geom '{geom}')" if geom else ""
+            words = fault.words.format(summary.measures[fault, geom])
+            told.append(f"MuJoCo's path is no geodesic at {count} of {poses} poses{at}: {words}")
+    return "; ".join(told)
+
+
+def _own_faults(summary: MuscleSummary) -> str:
+    """Say what was wrong with mjwrap's path."""
+    told = []
+    failed = summary.counts[Outcome.MJWRAP_FAILED.name]
+    if failed:
+        reasons = ", ".join(summary.statuses)
+        told.append(f"mjwrap found no path at {failed} poses where MuJoCo's is a true geodesic ({reasons})")
+    sides = summary.counts[Outcome.WRONG_SIDE.name]
+    if sides:
+        told.append(
+            f"at {sides} poses mjwrap starts on the side of the cylinder that is away from its side site"
+        )
+    for words, count in summary.own_faults.most_common(3):
+        told.append(f"mjwrap's path is no geodesic at {count} poses: {words}")
+    unexplained = summary.counts[Outcome.UNEXPLAINED.name]
+    if unexplained:
+        length, velocity, arm = summary.agreement
+        told.append(
+            f"at {unexplained} poses both are judged the same geodesic, but differ by up to {length:.0e} m, "
+            f"{velocity:.0e} m/s, {arm:.0e} m/rad"
+        )
+    return "; ".join(told)
+
+
+def _jumps(jumps: Sequence[Jump], program: str) -> str:
+    """Say how often and how far a program's path jumps."""
+    own = [jump for jump in jumps if jump.program == program]
+    if not own:
+        return ""
+    length, slope = max(abs(jump.length) for jump in own), max(abs(jump.slope) for jump in own)
+    s = "s" * (len(own) != 1)
+    return f"{program} jumps {len(own)} time{s}, by up to {1e3 * length:.3g} mm and {1e3 * slope:.3g} mm/rad"

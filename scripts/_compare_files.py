@@ -1,0 +1,202 @@
+"""A comparison as text, JSON and CSV."""
+
+from __future__ import annotations
+
+import csv
+import json
+from typing import IO, Any
+
+import mujoco
+import numpy as np
+from _common import Output
+
+import mjwrap
+from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, Verdict
+from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.twins import Batch
+from mjwrap.comparison.verdict import Extreme, differences, outcomes
+
+TITLES = {
+    Outcome.AGREE: "equal",
+    Outcome.OTHER_BRANCH: "other way round",
+    Outcome.MUJOCO_NOT_GEODESIC: "MuJoCo no geodesic",
+    Outcome.NO_PATH: "no path exists",
+    Outcome.MJWRAP_FAILED: "mjwrap failed",
+    Outcome.MJWRAP_WRONG: "mjwrap wrong",
+    Outcome.UNEXPLAINED: "unexplained",
+    Outcome.WRONG_SIDE: "wrong side",
+}
+_HEADER = (
+    "motion", "at", "muscle", "outcome", "length_mujoco", "length_mjwrap", "velocity_mujoco", "velocity_mjwrap",
+    "moment_arm_difference", "fault_mujoco", "fault_mjwrap", "status_mjwrap",
+)  # fmt: skip
+
+
+class PoseTable:
+    """A CSV file with a row for every muscle and pose, written while they are compared. SI units."""
+
+    def __init__(self, output: Output) -> None:
+        self._output = output
+        self._file: IO[str] = output.part.open("w", encoding="utf-8", newline="")
+        self._writer = csv.writer(self._file)
+        with output.writing():
+            self._writer.writerow(_HEADER)
+
+    def add(self, batch: Batch) -> None:
+        """Write one motion."""
+        with self._output.writing():
+            for twin in batch.twins:
+                native, mine = twin.native, twin.mjwrap
+                if mine is None:
+                    continue
+                found, gaps = outcomes(twin, batch.motion.continuous), differences(native, mine)
+                for k, at in enumerate(batch.motion.at.tolist()):
+                    row = [batch.motion.name, at, twin.name, Outcome(int(found[k])).name]
+                    row += [float(x[k]) for x in (native.length, mine.length, native.velocity, mine.velocity)]
+                    faults = [Fault(int(x.fault[k])).name for x in (native, mine)]
+                    self._writer.writerow([*row, float(gaps[2, k]), *faults, int(twin.status[k])])
+
+    def close(self) -> None:
+        """Finish the file and give it its name."""
+        with self._output.writing():
+            self._file.close()
+        self._output.publish()
+
+
+def print_poses(found: PoseComparison, verdicts: dict[str, Verdict]) -> None:
+    """Print counts and the largest differences of every muscle, then the verdicts and the jumps."""
+    both = [s for s in found.muscles.values() if not s.native_only]
+    if both:
+        _print_table(found, both)
+    print("\nwhich is right, and why")
+    equal = [s for s in both if s.counts[Outcome.AGREE.name] == s.poses and verdicts[s.name].right == "both"]
+    if equal:
+        length, velocity, arm = np.max([s.agreement for s in equal], axis=0)
+        told = f"to {length:.0e} m, {velocity:.0e} m/s, {arm:.0e} m/rad"
+        print(f"  both, equal at every pose {told}: {', '.join(s.name for s in equal)}")
+    for name, (right, why) in verdicts.items():
+        if found.muscles[name] not in equal:
+            print(f"  {name}: {right}: {why}" if right != "-" else f"  {name}: {why}")
+    for name, why in found.left_out.items():
+        print(f"  {name}: not compared: {why}")
+    far = [s for s in both if s.length.difference > AGREE]
+    if far:
+        print("\nwhere lengths differ most")
+        for s in sorted(far, key=lambda s: -s.length.difference)[:10]:
+            print(
+                f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {_where(s.length)}"
+            )
+    if found.jumps:
+        _print_jumps(found.jumps)
+
+
+def _print_table(found: PoseComparison, both: list[MuscleSummary]) -> None:
+    shown = [o for o in Outcome if o == Outcome.AGREE or found.total(o)]
+    wide = max(6, *(len(s.name) for s in both))
+    heads = [TITLES[o] for o in shown]
+    columns = "".join(f"  {head:>{max(len(head), 6)}}" for head in heads)
+    print(
+        f"{'muscle':{wide}}  {'poses':>6}{columns}   largest difference: length [m]  velocity [m/s]  arm [m/rad]"
+    )
+    for s in both:
+        counts = "".join(f"  {s.counts[o.name]:>{max(len(h), 6)}}" for o, h in zip(shown, heads, strict=True))
+        gaps = s.length.difference, s.velocity.difference, s.moment_arm.difference
+        print(f"{s.name:{wide}}  {s.poses:>6}{counts}   {gaps[0]:>31.1e}{gaps[1]:>16.1e}{gaps[2]:>13.1e}")
+
+
+def _print_jumps(jumps: list[Jump]) -> None:
+    """Print the largest jump of each program, muscle and joint."""
+    largest: dict[tuple[str, str, str], Jump] = {}
+    for jump in jumps:
+        key = jump.program, jump.muscle, jump.sweep
+        if key not in largest or abs(jump.length) > abs(largest[key].length):
+            largest[key] = jump
+    print(f"\njumps along the sweeps: {len(jumps)}, the largest of each muscle and joint")
+    for jump in sorted(largest.values(), key=lambda j: (j.program, j.muscle, j.sweep)):
+        print(
+            f"  {jump.program} {jump.muscle} at {jump.sweep} = {jump.at:.6f}: {1e3 * jump.length:+.3f} mm, "
+            f"moment arm {-1e3 * jump.slope:+.3f} mm; {jump.before} -> {jump.after}"
+        )
+
+
+def _where(extreme: Extreme) -> str:
+    if extreme.motion in extreme.joints:
+        return f"{extreme.motion} = {extreme.at:.6f}"
+    told = ", ".join(f"{name} = {value:.4f}" for name, value in list(extreme.joints.items())[:6])
+    return f"{extreme.motion} {extreme.at:g} ({told}{', ...' if len(extreme.joints) > 6 else ''})"
+
+
+def print_motion(motion: MotionDifference, changed: list[str], entries: list[str]) -> None:
+    """Print how far the two runs drift apart."""
+    print(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
+    if changed:
+        s = "s" * (len(changed) != 1)
+        print(
+            f"  {len(changed)} muscle{s} with another law pull by MuJoCo's curves (--law declared: by their own)"
+        )
+    dof, gap, when = motion.worst()
+    last, final = motion.final()
+    print(
+        f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]"
+    )
+    if motion.stopped:
+        print(f"  ended early: {motion.stopped}")
+    if motion.paths:
+        print("  mjwrap's run had no path (and held the last good force) for")
+        print("\n".join(f"    {line}" for line in motion.paths.splitlines()))
+
+
+def write_json(
+    output: Output, facts: dict[str, Any], found: PoseComparison, verdicts: dict[str, Verdict],
+    motion: MotionDifference | None,
+) -> None:  # fmt: skip
+    """Write everything as JSON and give the file its name."""
+    content: dict[str, Any] = {
+        **facts,
+        "mujoco": mujoco.__version__,
+        "mjwrap": mjwrap.__version__,
+        "poses": found.poses,
+        "totals": {o.name.lower(): found.total(o) for o in Outcome},
+        "muscles": {name: _muscle(s, verdicts[name]) for name, s in found.muscles.items()},
+        "jumps": [_jump(jump) for jump in found.jumps],
+        "left_out": found.left_out,
+    }
+    if motion is not None:
+        dof, gap, when = motion.worst()
+        last, final = motion.final()
+        content["motion"] = {
+            "duration": float(motion.time[-1]),
+            "largest": {"joint": dof, "difference": gap, "time": when},
+            "final": {"joint": last, "difference": final},
+            "each": dict(zip(motion.dofs, np.abs(motion.difference).max(axis=0).tolist(), strict=True)),
+            "stopped": motion.stopped,
+            "paths_not_found": motion.paths,
+        }
+    with output.writing():
+        output.part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    output.publish()
+
+
+def _muscle(s: MuscleSummary, verdict: Verdict) -> dict[str, Any]:
+    return {
+        "right": verdict.right,
+        "why": verdict.why,
+        "poses": s.poses,
+        "counts": {o.name.lower(): s.counts[o.name] for o in Outcome},
+        "mujoco_faults": [
+            {"fault": fault.name.lower(), "geom": geom, "poses": n, "largest": s.measures[fault, geom]}
+            for (fault, geom), n in s.faults.most_common()
+        ],
+        "agreement": dict(zip(("length", "velocity", "moment_arm"), s.agreement.tolist(), strict=True)),
+        "length": vars(s.length),
+        "velocity": vars(s.velocity),
+        "moment_arm": vars(s.moment_arm),
+        "mjwrap_at_fault": [
+            {"outcome": outcome.lower(), "motion": motion, "at": at, "joints": joints}
+            for outcome, motion, at, joints in s.bad_poses
+        ],
+    }
+
+
+def _jump(jump: Jump) -> dict[str, Any]:
+    return vars(jump)

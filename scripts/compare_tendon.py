@@ -1,0 +1,184 @@
+#!/usr/bin/env python3
+"""Compare MuJoCo's built-in tendon wrapping with mjwrap's paths on the same model, side by side.
+
+MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo_sim package composes. Every joint is swept over its
+range, around the start pose and around the middle of all ranges, and random poses are drawn. Each path is judged by
+its geometry: is it straight or a true geodesic, tangential where it meets the surface, nowhere below it, and a local
+minimum of length? Where the two differ, the verdict says which is right and why. Then both run forward with the same
+controls.
+
+Examples:
+  compare_tendon.py models/elbow/elbow.xml --plot out/compare.png
+  compare_tendon.py myo_sim:myoarm_r --samples 51 --bases 4 --muscles 'LAT*' DELT1 --json out/compare.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import sys
+from pathlib import Path
+
+import mujoco
+from _common import (
+    RUN_FAILED,
+    Output,
+    Parser,
+    UserError,
+    at_least,
+    load,
+    need_matplotlib,
+    not_negative,
+    progress_bar,
+    run,
+    start_keyframe,
+    start_state,
+)
+from _compare_files import PoseTable, print_motion, print_poses, write_json
+
+from mjwrap import MuscleSystem
+from mjwrap.comparison import compare_motion, compare_poses, verdict, with_native_laws
+
+
+def read_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Read the command line."""
+    parser = Parser(
+        prog="compare_tendon",
+        description=__doc__,
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("model", help="MJCF or MJB file, or myo_sim:NAME")
+    add("--muscles", nargs="+", metavar="NAME", help="only these (* and ? stand for anything)")
+    add(
+        "--samples",
+        type=at_least(3),
+        default=101,
+        metavar="N",
+        help="poses of a sweep, and random poses (%(default)s)",
+    )
+    add(
+        "--bases",
+        type=at_least(0),
+        default=1,
+        metavar="N",
+        help="further poses to sweep around (%(default)s)",
+    )
+    add(
+        "--seed",
+        type=at_least(0),
+        default=0,
+        metavar="N",
+        help="of random poses, velocities, excitation (%(default)s)",
+    )
+    add("--keyframe", metavar="NAME", help="start pose (default: the model's own)")
+    add(
+        "--duration", type=not_negative, default=1.0, metavar="S", help="of the motion; 0: none (%(default)s)"
+    )
+    add(
+        "--excitation",
+        nargs="+",
+        default=["random"],
+        metavar="PATTERN",
+        help="as simulate.py takes it (random)",
+    )
+    add("--law", choices=("mujoco", "declared"), default="mujoco", help="in mjwrap's run: MuJoCo's own curves, so that "
+        "both differ by the path alone, or the declared law")  # fmt: skip
+    add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
+    add("--json", metavar="FILE.json", help="all figures")
+    add("--csv", metavar="FILE.csv", help="a row for every muscle and pose")
+    add("--check", action="store_true", help="exit code 1 where mjwrap is not right")
+    return parser.parse_args(arguments)
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Compare, and print and write what came of it."""
+    model = load(options.model)
+    key = start_keyframe(model, options.keyframe)
+    start = start_state(model, key, [])
+    names = choose(model, options.muscles)
+    plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
+    facts = Output(options.json, "--json", (".json",)) if options.json else None
+    table = Output(options.csv, "--csv", (".csv",)) if options.csv else None
+    if plot is not None:
+        need_matplotlib()
+
+    rows = PoseTable(table) if table is not None else None
+    bar = progress_bar(1.0, "", "comparing")
+    done = 0.0
+
+    def advance(name: str, k: int, count: int) -> None:
+        nonlocal done
+        bar.set_description(name)
+        bar.update(k / count - done)
+        done = k / count
+
+    try:
+        found = compare_poses(
+            model, names=names, samples=options.samples, bases=options.bases, seed=options.seed,
+            base=start.qpos, each=rows.add if rows is not None else None, progress=advance,
+        )  # fmt: skip
+    finally:
+        bar.close()
+    verdicts = {
+        name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
+        for name, summary in found.muscles.items()
+    }
+    muscles = len(found.muscles)
+    print(f"{options.model}: {muscles} muscle{'s' * (muscles != 1)} at {found.poses} poses each")
+    print_poses(found, verdicts)
+    if rows is not None:
+        rows.close()
+
+    motion = None
+    if options.duration > 0.0:
+        moved, changed = with_native_laws(model) if options.law == "mujoco" else (model, [])
+        motion = compare_motion(moved, options.excitation, options.duration, key=key, seed=options.seed)
+        print_motion(motion, changed, options.excitation)
+    if facts is not None:
+        said = {
+            "model": options.model,
+            "samples": options.samples,
+            "bases": options.bases,
+            "seed": options.seed,
+        }
+        write_json(facts, said, found, verdicts, motion)
+    if plot is not None:
+        from _plot_compare import plot_comparison
+
+        title = f"{Path(options.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
+        plot_comparison(plot, title, found, motion)
+    for what, path in (("plot", options.plot), ("json", options.json), ("csv", options.csv)):
+        if path:
+            print(f"{what + ':':6s} {path}")
+    wrong = found.at_fault or any(jump.program == "mjwrap" for jump in found.jumps)
+    return RUN_FAILED if options.check and wrong else 0
+
+
+def choose(model: mujoco.MjModel, wanted: list[str] | None) -> list[str] | None:
+    """Return the names of the muscles that the patterns `wanted` match, None for all."""
+    muscles = MuscleSystem(model)
+    muscles.release()
+    known = [*muscles.names, *muscles.native]
+    if not known:
+        raise UserError("the model has no muscles: nothing to compare")
+    if wanted is None:
+        return None
+    found: list[str] = []
+    for pattern in wanted:
+        fit = [name for name in fnmatch.filter(known, pattern) if name not in found]
+        if not fit and pattern not in found:
+            raise UserError(f"no muscle '{pattern}'; muscles: {', '.join(known)}")
+        found += fit
+    return found
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the script; see `_common.run` for exit codes."""
+    options = read_arguments(arguments)
+    return run("compare_tendon", lambda: compare(options))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
