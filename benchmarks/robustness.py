@@ -1,8 +1,8 @@
 """Cold starts over random rows of cylinders and spheres: how many converge, and is every claim true?
 
-Scenes at muscle scale (spacing 6 to 12 cm, radii 1 to 4.5 cm, axes tilted by about 0.4 rad, nothing overlapping), with and
-without random hints. Each solution that is called converged is judged again by the independent certificate of
-`tests/scenes.py`, from its contact points alone. Cases that do not converge can be saved and replayed.
+Scenes at muscle scale (spacing 6 to 12 cm, radii 1 to 4.5 cm, axes tilted by about 0.4 rad, nothing overlapping),
+with and without random hints. Each solution that is called converged is judged again by the independent certificate
+of `tests/scenes.py`, from its contact points alone. Cases that do not converge can be saved and replayed.
 """
 
 from __future__ import annotations
@@ -81,10 +81,11 @@ def main() -> int:
             others = ", ".join(
                 f"{count} {status}" for status, count in counts.items() if status != "CONVERGED"
             )
+            hint = "random" if hints else "none"
+            seconds = time.perf_counter() - started
             print(
-                f"{name:<12} {'random' if hints else 'none':<7} {options.scenes:>6} {counts['CONVERGED']:>9} {refuted:>7}"
-                f"  {np.median(evaluations):>6.0f} {max(evaluations):>5}  {others or '-'}"
-                f"   ({time.perf_counter() - started:.0f} s)",
+                f"{name:<12} {hint:<7} {options.scenes:>6} {counts['CONVERGED']:>9} {refuted:>7}"
+                f"  {np.median(evaluations):>6.0f} {max(evaluations):>5}  {others or '-'}   ({seconds:.0f} s)",
                 flush=True,
             )
     print("median, most: evaluations of all residuals, closed-form wraps of every obstacle counted like one")
