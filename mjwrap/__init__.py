@@ -5,7 +5,15 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mjwrap.errors import GeometryError, ModelError, MjwrapError, PathError, RecordingError, SignalError, StateError
+from mjwrap.errors import (
+    GeometryError,
+    MjwrapError,
+    ModelError,
+    PathError,
+    RecordingError,
+    SignalError,
+    StateError,
+)
 
 if TYPE_CHECKING:
     from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle, PathActuator
@@ -56,8 +64,8 @@ __all__ = [
     "PathActuator",
     "PathError",
     "PathSolution",
-    "RecordingError",
     "Recorder",
+    "RecordingError",
     "SignalError",
     "Sphere",
     "StateError",

@@ -208,6 +208,27 @@ def test_a_place_that_cannot_be_written_is_passed_over(places: Path) -> None:
     assert _jit.cache_dir() == found
 
 
+def test_a_user_without_a_home(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", no_home)
+    assert _jit.cache_dir().is_relative_to(places / "temporary")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="files have no numbered owners there")
+def test_machine_code_of_somebody_else_is_not_trusted(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anyone may make the folder in the temporary one; loading machine code runs it."""
+    (places / "xdg").touch()
+    shared = _jit.cache_dir()
+    me = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: me + 1)
+    found = _jit.cache_dir()
+    assert found != shared
+    assert found.is_relative_to(places / "temporary")
+
+
 def test_without_any_lasting_place_each_process_has_its_own(
     places: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

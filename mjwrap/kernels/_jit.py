@@ -6,6 +6,7 @@ cache therefore lives in a folder named by a hash over all kernel sources: any e
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import sys
@@ -15,8 +16,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core import config as numba_config
 from numba.core import event
 
+config: Any = numba_config  # its variables, set from the environment, are not known to type checkers
+njit: Any = numba.njit
 F = TypeVar("F", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
 _NOTICE = "mjwrap: compiling its kernels, once for this machine and version (10 to 20 s) ..."
@@ -37,19 +41,23 @@ def _boundscheck() -> str:
 def _candidates() -> list[Path]:
     """Return the folders in which the cache may live, best first."""
     found = []
-    if numba.config.CACHE_DIR:  # NUMBA_CACHE_DIR
-        found.append(Path(numba.config.CACHE_DIR))
+    if config.CACHE_DIR:  # NUMBA_CACHE_DIR
+        found.append(Path(config.CACHE_DIR))
     if os.environ.get("XDG_CACHE_HOME"):
         found.append(Path(os.environ["XDG_CACHE_HOME"]))
     elif os.name == "nt":
         found.append(Path(os.environ.get("LOCALAPPDATA", tempfile.gettempdir())))
-    elif sys.platform == "darwin":
-        found.append(Path.home() / "Library" / "Caches")
     else:
-        found.append(Path.home() / ".cache")
+        with contextlib.suppress(RuntimeError):  # a user without a home
+            found.append(Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache"))
     user = os.environ.get("USER", os.environ.get("USERNAME", "user"))
     found.append(Path(tempfile.gettempdir()) / f"mjwrap-{user}")
     return found
+
+
+def _is_trusted(base: Path) -> bool:
+    """Return whether nobody else can have put machine code there; anyone may write to the temporary folder."""
+    return os.name == "nt" or base.parent != Path(tempfile.gettempdir()) or base.stat().st_uid == os.getuid()
 
 
 def cache_dir() -> Path:
@@ -59,7 +67,8 @@ def cache_dir() -> Path:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
-                return folder
+                if _is_trusted(base):
+                    return folder
         except OSError:
             continue
     return Path(tempfile.mkdtemp(prefix="mjwrap-"))
@@ -88,15 +97,9 @@ event.register("numba:compile", _Announcer())
 
 def jit(function: F) -> F:
     """Compile a kernel: no GIL, IEEE semantics but for fused multiply-adds, machine code kept on disk."""
-    return _compile(function, "never")
-
-
-def _compile(function: Any, inline: str) -> Any:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE  # read by numba when the function is decorated
+    before = config.CACHE_DIR
+    config.CACHE_DIR = _CACHE  # read by numba when the function is decorated
     try:
-        return numba.njit(
-            function, cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, inline=inline
-        )
+        return njit(function, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before

@@ -13,6 +13,7 @@ from mjwrap.kernels import chain, layout
 from mjwrap.surfaces import Surface
 
 Array = NDArray[np.float64]
+Point = tuple[float, float, float]
 
 
 def vector(value: ArrayLike, size: int, what: str) -> tuple[float, ...]:
@@ -25,6 +26,11 @@ def vector(value: ArrayLike, size: int, what: str) -> tuple[float, ...]:
     if not np.isfinite(array).all():
         raise GeometryError(f"{what} must be finite, not {array.tolist()}")
     return tuple(array.tolist())
+
+
+def point(value: ArrayLike, what: str) -> Point:
+    x, y, z = vector(value, 3, what)
+    return x, y, z
 
 
 @dataclass(frozen=True)

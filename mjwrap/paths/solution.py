@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout, polyline, segments
-from mjwrap.paths.scene import SAVED, Array, vector
+from mjwrap.paths.scene import SAVED, Array, Point, vector
 from mjwrap.paths.status import Status
 
 
@@ -35,9 +35,7 @@ class PathSolution:
     `Contact` per obstacle. Where the path was not found the length is that of the last iterate, never NaN.
     """
 
-    def __init__(
-        self, origin: tuple[float, ...], insertion: tuple[float, ...], node: Array, saved: Array
-    ) -> None:
+    def __init__(self, origin: Point, insertion: Point, node: Array, saved: Array) -> None:
         self._origin, self._insertion, self._node, self._saved = origin, insertion, node, saved
         self._ends = (0, len(node), *origin, *insertion)
         self.length = 0.0

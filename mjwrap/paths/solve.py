@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import chain, layout
-from mjwrap.paths.scene import SAVED, Array, Obstacle, ViaPoint, pack, vector
+from mjwrap.paths.scene import SAVED, Array, Obstacle, Point, ViaPoint, pack, point
 from mjwrap.paths.solution import PathSolution
 
 
@@ -43,7 +43,7 @@ def solve_path(
     """
     if not (np.isfinite(tol) and tol > 0.0):
         raise GeometryError(f"tol must be finite and positive, not {tol!r}")
-    here, there = vector(origin, 3, "origin"), vector(insertion, 3, "insertion")
+    here, there = point(origin, "origin"), point(insertion, "insertion")
     node = pack(obstacles)
     _start(start, node)
     before = node[:, SAVED].copy()
@@ -62,8 +62,8 @@ def solve_path(
 
 def _solve_with(
     method: str,
-    origin: tuple[float, ...],
-    insertion: tuple[float, ...],
+    origin: Point,
+    insertion: Point,
     obstacles: Sequence[Obstacle | ViaPoint],
     node: Array,
     start: PathSolution | None,
