@@ -71,7 +71,7 @@ class Mjwrap:
         poses = len(self.pos)
         total, solution = self._call(0, poses)
         starts = range(0, poses - BLOCK - LEAD + 1, BLOCK)
-        lead = np.median([self._call(first, first + LEAD)[0] for first in starts])
+        lead = np.median([self._call(first, first + LEAD)[0] for first in starts for _ in range(3)])
         blocks = np.array([self._call(first, first + LEAD + BLOCK)[0] for first in starts])
         bad = (solution.status != mw.Status.CONVERGED) | ~(solution.tangency_error <= 1e-10)
         notes = {
