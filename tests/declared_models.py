@@ -43,6 +43,11 @@ ARM = """
 EXTENSOR = """<spatial name="extensor">
   <site site="origin"/> <geom geom="elbow" sidesite="elbow_side"/> <site site="via"/> <site site="middle"/>
   <geom geom="ball" sidesite="ball_side"/> <site site="insertion"/></spatial>"""
+PULLEYS = """<spatial name="extensor">
+  <site site="origin"/> <geom geom="elbow" sidesite="elbow_side"/> <site site="via"/>
+  <pulley divisor="2"/> <site site="via"/> <site site="middle"/> <geom geom="ball" sidesite="ball_side"/>
+  <site site="insertion"/>
+  <pulley divisor="3"/> <site site="via"/> <site site="insertion"/></spatial>"""
 MUSCLE = '<muscle name="extensor" tendon="extensor" force="400" lengthrange="0.3 0.6"/>'
 HILL = {"max_isometric_force": 600.0, "optimal_fiber_length": 0.12, "tendon_slack_length": 0.3}
 
@@ -58,6 +63,17 @@ def compiled(
 def element(kind: str, name: str, prm: float | None = None) -> str:
     given = "" if prm is None else f' prm="{prm:g}"'
     return f'<element objtype="{kind}" objname="{name}"{given}/>'
+
+
+ROW = [
+    element("site", "origin"),
+    element("geom", "elbow"),
+    element("site", "elbow_side", 1),
+    element("geom", "ball"),
+    element("geom", "wrist"),
+    element("site", "wrist_side", 1),
+    element("site", "insertion"),
+]
 
 
 def numerics(
