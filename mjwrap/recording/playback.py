@@ -1,6 +1,8 @@
 """Recordings once they are there: what one holds, and the viewer on it."""
 
+import contextlib
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -83,7 +85,11 @@ def _indexed(reader: "RrdReader", entry: "StoreEntry") -> "LazyStore":
 
 def open_native(path: str | os.PathLike[str]) -> int:
     """Open the native viewer on a recording, wait until it is closed and give its exit code."""
-    return _viewer([str(path)]).wait()
+    process = _viewer([str(path)])
+    try:
+        return process.wait()
+    finally:
+        process.terminate()
 
 
 def serve(path: str | os.PathLike[str], port: int = 9090) -> tuple[str, subprocess.Popen[bytes]]:
@@ -105,6 +111,18 @@ def serve(path: str | os.PathLike[str], port: int = 9090) -> tuple[str, subproce
     return f"http://127.0.0.1:{port}?url={data}", _viewer([str(path), "--serve-web", *limits, *ports])
 
 
-def _viewer(arguments: list[str]) -> subprocess.Popen[bytes]:
+class _Viewer(subprocess.Popen[bytes]):
+    """The viewer's launcher, which does not hand signals on to the viewer that it starts: so end both."""
+
+    def terminate(self) -> None:
+        """End the launcher and its viewer."""
+        if os.name == "posix":
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.pid, signal.SIGTERM)
+        else:
+            super().terminate()
+
+
+def _viewer(arguments: list[str]) -> _Viewer:
     quiet = {"RUST_LOG": "warn", **os.environ}
-    return subprocess.Popen([sys.executable, "-m", "rerun_cli", *arguments], env=quiet)
+    return _Viewer([sys.executable, "-m", "rerun_cli", *arguments], env=quiet, start_new_session=True)
