@@ -1,47 +1,61 @@
 #!/usr/bin/env python3
-"""Replay a recording: in the native viewer, in a browser, or say what it holds.
+"""Replay a recording: in rerun's own viewer, in a browser, or say what it holds.
 
-python scripts/replay.py FILE.rrd            open it (in a browser where there is no display)
-python scripts/replay.py FILE.rrd --serve    serve it to a browser until Ctrl-C
-python scripts/replay.py FILE.rrd --info     print what it holds
+Without an option the viewer opens, or where there is no display the recording is served to a browser. Exit code 2
+where the file is missing or damaged.
 """
+
+from __future__ import annotations
 
 import argparse
 import os
 import sys
 
-from mjwrap.errors import MjwrapError
+from _common import Parser, UserError, run
+
+from mjwrap.errors import RecordingError
 from mjwrap.recording import Summary, open_native, read_summary, serve
 
 
-def main() -> int:
-    """Run the command line; the exit code is 1 where the file is missing or damaged."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+def read_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Read the command line."""
+    parser = Parser(prog="replay", description=__doc__, allow_abbrev=False)
     parser.add_argument("file", help="recording (.rrd)")
-    parser.add_argument("--serve", action="store_true", help="serve to a browser on this machine")
-    parser.add_argument(
-        "--port", type=int, default=9090, help="where to serve (default %(default)s, and the next)"
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        "--serve", action="store_true", help="serve it to a browser on this machine until Ctrl-C"
     )
-    parser.add_argument("--info", action="store_true", help="print what the recording holds, and stop")
-    arguments = parser.parse_args()
+    what.add_argument("--info", action="store_true", help="print what it holds, and stop")
+    parser.add_argument(
+        "--port",
+        type=port,
+        default=9090,
+        metavar="N",
+        help="where to serve: N and N + 1 (default %(default)s)",
+    )
+    return parser.parse_args(arguments)
+
+
+def port(text: str) -> int:
+    """Return a port that has a next one, for argparse."""
+    number = int(text)
+    if not 0 < number < 65535:
+        raise argparse.ArgumentTypeError(f"{text} must lie between 1 and 65534")
+    return number
+
+
+def replay(options: argparse.Namespace) -> int:
+    """Look at the whole file first, so that a damaged one is an error here and not an empty viewer."""
     try:
-        summary = read_summary(arguments.file)
-        if arguments.info:
+        summary = read_summary(options.file)
+        if options.info:
             print(describe(summary), flush=True)
             return 0
-        if arguments.serve or not has_display():
-            return serve_until_stopped(arguments.file, arguments.port)
-        return open_native(arguments.file)
-    except MjwrapError as error:
-        print(f"replay: {error}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:  # the reader of --info has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except KeyboardInterrupt:
-        return 130
+        if options.serve or not has_display():
+            return serve_until_stopped(options.file, options.port)
+        return open_native(options.file)
+    except RecordingError as error:
+        raise UserError(str(error)) from None
 
 
 def describe(summary: Summary) -> str:
@@ -63,10 +77,10 @@ def has_display() -> bool:
     )
 
 
-def serve_until_stopped(path: str, port: int) -> int:
+def serve_until_stopped(path: str, number: int) -> int:
     """Serve a recording until Ctrl-C or the end of the server."""
-    address, process = serve(path, port)
-    print(f"Open {address}\nCtrl-C stops serving.", flush=True)
+    address, process = serve(path, number)
+    print(f"open {address}\nCtrl-C stops serving", flush=True)
     try:
         return process.wait()
     except KeyboardInterrupt:
@@ -77,4 +91,5 @@ def serve_until_stopped(path: str, port: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    arguments = read_arguments()
+    sys.exit(run("replay", lambda: replay(arguments)))

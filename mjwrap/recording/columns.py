@@ -1,6 +1,6 @@
 """Columns of a recording: NumPy rows gathered during the run, turned into Arrow columns a few hundred at once."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -103,15 +103,18 @@ def path_columns(paths: "Ragged", contacts: "Ragged", colors: npt.NDArray[np.uin
 
     A muscle that has no path in a frame, because none was found yet, has an empty row there.
     """
-    frames, columns = len(colors), []
-    for (points, counts), (touch, touches), color in zip(
-        paths.by_muscle(frames), contacts.by_muscle(frames), np.ascontiguousarray(colors.T), strict=True
-    ):
-        strips = pa.ListArray.from_arrays(_offsets(counts[counts > 0]), _fixed(points, _VEC3), type=_STRIP)
-        columns.append(pa.ListArray.from_arrays(_offsets(counts > 0), strips))
-        columns.append(pa.ListArray.from_arrays(_one_each(len(color)), pa.array(color)))
-        columns.append(pa.ListArray.from_arrays(_offsets(touches), _fixed(touch, _VEC3)))
-    return columns
+    frames, n = colors.shape
+    points, counts = paths.by_muscle(frames)
+    drawn = counts > 0
+    strips = pa.ListArray.from_arrays(_offsets(counts[drawn]), _fixed(points, _VEC3), type=_STRIP)
+    touches, numbers = contacts.by_muscle(frames)
+    # each array holds all muscles, one after the other; a column is a slice of it, which costs nothing
+    whole = (
+        pa.ListArray.from_arrays(_offsets(drawn), strips),
+        pa.ListArray.from_arrays(_one_each(n * frames), pa.array(np.ascontiguousarray(colors.T).ravel())),
+        pa.ListArray.from_arrays(_offsets(numbers), _fixed(touches, _VEC3)),
+    )
+    return [array.slice(i * frames, frames) for i in range(n) for array in whole]
 
 
 class Ragged:
@@ -124,22 +127,25 @@ class Ragged:
     def put(self, frame: int, points: Array, starts: Array) -> None:
         """Set the last frame: muscle i has `points[starts[i]:starts[i + 1]]`. What an interrupt left goes."""
         del self._points[frame:], self._starts[frame:]
-        self._points.append(np.array(points, dtype=np.float32))
-        self._starts.append(np.array(starts, dtype=np.int64))
+        self._points.append(points)
+        self._starts.append(starts)
 
     def first(self) -> Array:
         """The points (m, 3) of the first frame, none where there is no frame."""
-        return self._points[0] if self._points else np.empty((0, 3), dtype=np.float32)
+        return self._points[0] if self._points else np.empty((0, 3))
 
-    def by_muscle(self, frames: int) -> Iterator[tuple[Array, Array]]:
-        """For every muscle its points of all frames in a row (m, 3), and how many there are a frame (T,)."""
-        counts = np.diff(np.stack(self._starts[:frames]), axis=1)  # (T, n)
-        points = np.concatenate(self._points[:frames])
-        owner = np.repeat(np.tile(np.arange(counts.shape[1]), len(counts)), counts.ravel())
-        points = points[np.argsort(owner, kind="stable")]
-        ends = np.cumsum(counts.sum(axis=0))
-        for i, end in enumerate(ends):
-            yield points[end - counts[:, i].sum() : end], counts[:, i]
+    def by_muscle(self, frames: int) -> tuple[Array, Array]:
+        """All points (m, 3), those of a muscle in a row, frame after frame, and how many each has (n frames,)."""
+        starts = np.stack(self._starts[:frames])  # (T, n + 1)
+        counts = np.diff(starts, axis=1).T.ravel()
+        before = np.concatenate([[0], np.cumsum(starts[:-1, -1])])  # points of earlier frames
+        blocks = (
+            starts[:, :-1] + before[:, np.newaxis]
+        ).T.ravel()  # where each muscle's points of a frame begin
+        ends = np.cumsum(counts)
+        order = np.arange(ends[-1]) + np.repeat(blocks - ends + counts, counts)
+        points = np.concatenate(self._points[:frames], dtype=np.float32)
+        return points.take(order, axis=0), counts
 
 
 def _one_each(rows: int) -> pa.Array:

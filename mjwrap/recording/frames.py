@@ -1,7 +1,5 @@
 """Rows of a recording between two flushes: one of scalars a call, one of poses and paths a displayed frame."""
 
-from collections.abc import Callable
-from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +14,7 @@ from mjwrap.recording.stream import Stream
 if TYPE_CHECKING:
     from mjwrap.system import MuscleSystem
 
-Joined = tuple[np.ndarray, np.ndarray]  # points (m, 3) of all muscles, and where each muscle starts (n + 1,)
+EARLY = 1e-6  # part of a frame's period by which it may come too early, for times that are not exact
 
 
 class Buffers:
@@ -27,10 +25,12 @@ class Buffers:
     ) -> None:
         self._scene, self._muscles = scene, muscles
         self._rate = rate
-        self._polylines, self._touches = _polylines(muscles, spacing), _touches(muscles)
+        self._spacing = spacing
+        self._poses = getattr(muscles, "poses", lambda data: data)
         n, bodies = len(scene.muscle_names), scene.model.nbody
         self._time = np.empty(rows)
         self._scalars = np.empty((len(columns.QUANTITIES), rows, n))
+        self._length, self._velocity, self._tension, self._activation = self._scalars
         self._frame_rows = np.empty(rows, dtype=np.int64)  # the row that each frame belongs to
         self._positions = np.empty((rows, bodies, 3), dtype=np.float32)
         self._quaternions = np.empty((rows, bodies, 4), dtype=np.float32)
@@ -42,7 +42,7 @@ class Buffers:
         self._path_table = columns.path_table(scene.paths, scene.contacts)
         self._rows = self._frames = 0
         self._start: float | None = None  # time of the first call
-        self._last_time, self._last_frame = -np.inf, -1
+        self._last_time = self._next_frame = -np.inf
 
     @property
     def full(self) -> bool:
@@ -52,34 +52,35 @@ class Buffers:
     def add(self, data: Any) -> None:
         """Copy what belongs to the muscles' last forward."""
         muscles, row = self._muscles, self._rows
-        time = float(getattr(muscles, "time", data.time))
+        time = muscles.time
         if not time >= self._last_time:
             raise RecordingError(
                 f"cannot log at time {time} s after {self._last_time} s: one recording is one run, in which time "
                 "goes forward; close this Recorder and make another one after a reset"
             )
-        if self._start is None:
-            self._start = time
         self._time[row] = time
-        length, velocity, tension, activation = self._scalars
-        length[row] = muscles.length
-        velocity[row] = muscles.velocity
-        tension[row] = muscles.tension
-        activation[row] = muscles.activation
-        frame = int((time - self._start) * self._rate + 1e-6)
-        if frame > self._last_frame:
-            self._add_frame(data, row)
-            self._last_frame = frame
+        self._length[row] = muscles.length
+        self._velocity[row] = muscles.velocity
+        self._tension[row] = muscles.tension
+        self._activation[row] = muscles.activation
+        if time >= self._next_frame:
+            self._add_frame(data, row, time)
         self._last_time = time
         self._rows = row + 1
 
-    def _add_frame(self, data: Any, row: int) -> None:
+    def _add_frame(self, data: Any, row: int, time: float) -> None:
+        if self._start is None:
+            self._start = time
+        # frames are due at whole multiples of the period, so that rounding does not add up
+        due = np.floor((time - self._start) * self._rate + EARLY) + 1
+        self._next_frame = self._start + (due - EARLY) / self._rate
         frame = self._frames
-        self._positions[frame] = data.xpos
-        self._quaternions[frame] = data.xquat
+        poses = self._poses(data)
+        self._positions[frame] = poses.xpos
+        self._quaternions[frame] = poses.xquat
         self._frame_rows[frame] = row
-        self._paths.put(frame, *self._polylines())
-        self._contacts.put(frame, *self._touches())
+        self._paths.put(frame, *self._muscles.polylines(self._spacing))
+        self._contacts.put(frame, *self._muscles.contacts())
         self._frames = frame + 1
 
     def lay_out(self, stream: Stream) -> None:
@@ -106,23 +107,3 @@ class Buffers:
             batches.append(self._path_table.batch(times, cells))
         self._rows = self._frames = 0
         return batches
-
-
-def _polylines(muscles: "MuscleSystem", spacing: float | None) -> Callable[[], Joined]:
-    """A call that gives the polylines of all muscles, in one go where `muscles` can."""
-    together = getattr(muscles, "polylines", None)
-    if together is not None:
-        return lambda: together(spacing)
-    return lambda: _joined([muscles.points(i, spacing) for i in range(muscles.n)])
-
-
-def _touches(muscles: "MuscleSystem") -> Callable[[], Joined]:
-    """A call that gives the contact points of all muscles, in one go where `muscles` can."""
-    together = getattr(muscles, "contacts", None)
-    return together or (lambda: _joined([muscles.contact_points(i).reshape(-1, 3) for i in range(muscles.n)]))
-
-
-def _joined(points: list[np.ndarray]) -> Joined:
-    """Join the points of all muscles; (m, 3) and where each muscle starts (n + 1,)."""
-    starts = list(accumulate((len(each) for each in points), initial=0))
-    return np.concatenate(points), np.array(starts)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from mjwrap.recording.stream import Stream
     from mjwrap.system import MuscleSystem
 
+BUFFERED = 250_000  # states of a muscle that are gathered unless the caller says otherwise; 8 MB
+
 
 class Recorder:
     """Record a simulation for rerun: the moving model, muscle paths coloured by activation, and time series.
@@ -28,7 +30,8 @@ class Recorder:
     `model` is a mujoco.MjModel, `muscles` its MuscleSystem, `path` a file name that ends in .rrd. Bodies, paths and
     contact points are taken `path_rate` times per second of simulated time [Hz], length [m], lengthening
     speed [m/s], tension [N] and activation of every muscle at every `log`. `flush_every` calls are gathered before
-    they go to the file; `spacing` [m] is the distance of the points on curved parts of a path.
+    they go to the file (None: 4000, fewer where there are many muscles); `spacing` [m] is the distance of points on
+    the curved parts of a path (None: as many as their curvature asks for).
 
     The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
     Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
@@ -44,16 +47,16 @@ class Recorder:
         path: str | os.PathLike[str],
         *,
         path_rate: float = 60.0,
-        flush_every: int = 1000,
+        flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
         _require("path_rate", path_rate, 0 < path_rate < math.inf, "a positive number of frames per second")
-        _require("flush_every", flush_every, flush_every >= 1, "at least 1")
+        _require("flush_every", flush_every, flush_every is None or flush_every >= 1, "at least 1")
         _require("spacing", spacing, spacing is None or 0 < spacing < math.inf, "a positive length in metres")
         self._ended = ""  # why no more can be logged
         self._target = PartFile(path)
         try:
-            buffers, stream = _open(model, muscles, self._target, path_rate, int(flush_every), spacing)
+            buffers, stream = _open(model, muscles, self._target, path_rate, flush_every, spacing)
         except BaseException:
             self._target.discard()
             raise
@@ -123,7 +126,12 @@ class Recorder:
 
 
 def _open(
-    model: Any, muscles: "MuscleSystem", target: PartFile, rate: float, rows: int, spacing: float | None
+    model: Any,
+    muscles: "MuscleSystem",
+    target: PartFile,
+    rate: float,
+    rows: int | None,
+    spacing: float | None,
 ) -> tuple["Buffers", "Stream"]:
     """Start the file; rerun loads here and nowhere earlier."""
     try:
@@ -142,6 +150,7 @@ def _open(
     except BaseException:
         stream.abandon()
         raise
+    rows = rows or int(np.clip(BUFFERED // max(1, muscles.n), 250, 4000))
     return Buffers(scene, muscles, rate, rows, spacing), stream
 
 
