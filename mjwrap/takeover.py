@@ -7,6 +7,7 @@ bias parameters, which no actuator that mjwrap takes over uses: so a copy of a s
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -23,6 +24,7 @@ class _Limits(NamedTuple):
     high: float
 
 
+_RELEASES: dict[int, int] = {}  # how often each living model was released, by its id
 _UNLIMITED = _Limits(False, -mujoco.mjMAXVAL, mujoco.mjMAXVAL)
 
 
@@ -31,6 +33,9 @@ class Takeover:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
+        if id(model) not in _RELEASES:
+            weakref.finalize(model, _RELEASES.pop, id(model), None)
+        self._seen = _RELEASES.setdefault(id(model), 0)
         marks = zip(model.actuator_gainprm[:, -1], model.actuator_biasprm[:, -1], strict=True)
         self._limits = {
             actuator: _Limits(high < mujoco.mjMAXVAL, low, high)
@@ -64,12 +69,17 @@ class Takeover:
                 self._limits[actuator] = _Limits(True, low, high) if limited else _UNLIMITED
             self._silence(actuator, self._limits[actuator])
 
+    def lost(self) -> bool:
+        """Return whether the model was released, by this or another takeover, since this one began."""
+        return _RELEASES[id(self._model)] != self._seen
+
     def release(self) -> None:
         """Restore the original limits of those that are silenced still."""
         for actuator, limits in self._limits.items():
             if self._is_silent(actuator):
                 self._restore(actuator, limits)
         self._limits.clear()
+        _RELEASES[id(self._model)] += 1
 
     @contextmanager
     def suspended(self) -> Iterator[None]:

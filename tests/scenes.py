@@ -38,12 +38,18 @@ def rotation(quat: Any) -> Array:
     )
 
 
+def radius_of(obstacle: mw.Obstacle) -> float:
+    """Return the radius of a cylinder or sphere [m]."""
+    assert isinstance(obstacle.surface, mw.Cylinder | mw.Sphere)
+    return obstacle.surface.dims[0]
+
+
 def height(obstacle: mw.Obstacle, points: Array) -> Array:
     """Return the distance of points (m, 3) from an obstacle's surface, positive outside [m]."""
     local = (np.atleast_2d(points) - obstacle.pos) @ rotation(obstacle.quat)
     if isinstance(obstacle.surface, mw.Cylinder):
         local = local[:, :2]
-    return np.linalg.norm(local, axis=1) - obstacle.surface.radius
+    return np.linalg.norm(local, axis=1) - radius_of(obstacle)
 
 
 def outward(obstacle: mw.Obstacle, points: Array) -> Array:
@@ -60,7 +66,7 @@ def _gap(a: mw.Obstacle, b: mw.Obstacle) -> float:
     offset = np.subtract(b.pos, a.pos)
     axes = [rotation(o.quat)[:, 2] for o in (a, b) if isinstance(o.surface, mw.Cylinder)]
     if len(axes) == 2:
-        normal = np.cross(*axes)
+        normal = np.cross(axes[0], axes[1])
         size = float(np.linalg.norm(normal))
         if size > 1e-9:
             return abs(float(offset @ normal)) / size
@@ -88,7 +94,7 @@ def random_scene(rng: np.random.Generator, kinds: str, hints: bool) -> tuple[Arr
                     hint = tuple(direction / np.linalg.norm(direction) * radius)
                 quat = (1.0, *(0.2 * rng.normal(size=3)))
                 obstacle = mw.Obstacle(surface, tuple(pos), quat, hint)
-                reach = [radius + other.surface.radius for other in row]
+                reach = [radius + radius_of(other) for other in row]
                 if all(_gap(obstacle, o) > 1.05 * r for o, r in zip(row, reach, strict=True)):
                     row.append(obstacle)
                     break
@@ -131,10 +137,10 @@ def check_path(origin: Array, insertion: Array, obstacles: list[mw.Obstacle], so
 def _between(obstacle: mw.Obstacle, row: list[mw.Obstacle], sol: mw.PathSolution, a: Array, b: Array) -> bool:
     """Return whether the straight segment from a to b passes an obstacle's turn in the row."""
     k = row.index(obstacle)
-    before = [c.Q for c in sol.contacts[:k] if c.active]
-    after = [c.P for c in sol.contacts[k + 1 :] if c.active]
+    before = [c.Q for c in sol.contacts[:k] if c.Q is not None]
+    after = [c.P for c in sol.contacts[k + 1 :] if c.P is not None]
     here = sol.contacts[k]
-    if here.active:
+    if here.P is not None and here.Q is not None:
         return np.array_equal(b, here.P) or np.array_equal(a, here.Q)
     starts_before = not before or np.array_equal(a, before[-1])
     return starts_before and (not after or np.array_equal(b, after[0]))
@@ -147,12 +153,12 @@ def _shortest_arc(obstacle: mw.Obstacle, contact: mw.Contact, before: Array) -> 
     turn = rotation(obstacle.quat)
     p, q = ((x - obstacle.pos) @ turn for x in (contact.P, contact.Q))
     heading = (contact.P - before) @ turn
-    radius = obstacle.surface.radius
+    radius = radius_of(obstacle)
     if isinstance(obstacle.surface, mw.Sphere):
         axis = np.cross(p, heading)
         axis /= np.linalg.norm(axis)
         angle = np.arctan2(np.cross(p, q) @ axis, p @ q) % (2 * np.pi)
-        return radius * angle, turn @ np.cross(axis, p) / radius, turn @ np.cross(axis, q) / radius
+        return float(radius * angle), turn @ np.cross(axis, p) / radius, turn @ np.cross(axis, q) / radius
     side = 1.0 if p[0] * heading[1] - p[1] * heading[0] > 0 else -1.0
     angle = (side * np.arctan2(p[0] * q[1] - p[1] * q[0], p[0] * q[0] + p[1] * q[1])) % (2 * np.pi)
     flat, rise = radius * angle, q[2] - p[2]

@@ -12,6 +12,7 @@ from mjwrap.kernels import geodesics
 from mjwrap.kernels import layout as lay
 
 Array = NDArray[np.float64]
+Variation = tuple[float, float, float, float]
 KINDS = {"cylinder": lay.CYLINDER, "sphere": lay.SPHERE}
 CASES = 50
 
@@ -32,7 +33,14 @@ def row(kind: int, rng: np.random.Generator) -> Array:
     return node
 
 
-def evaluated(node: Array, d: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)) -> Array:
+def variation(which: int, size: float) -> Variation:
+    """Return the natural variation that moves one of the four ways only."""
+    d = [0.0, 0.0, 0.0, 0.0]
+    d[which] = size
+    return d[0], d[1], d[2], d[3]
+
+
+def evaluated(node: Array, d: Variation = (0.0, 0.0, 0.0, 0.0)) -> Array:
     """Return the evaluated row after a natural variation."""
     moved = node.copy()
     geodesics.displace(0, *d, moved)
@@ -99,9 +107,7 @@ def test_normal_turns_with_the_shape_operator(kind: int) -> None:
         kappa, tau, beta = triple(at, lay.W_KP)
 
         def rate(which: int, h: float, node: Array = node, size: float = size) -> Array:
-            d = [0.0, 0.0, 0.0, 0.0]
-            d[which] = h * size
-            ahead, behind = evaluated(node, tuple(d)), evaluated(node, tuple(-x for x in d))
+            ahead, behind = (evaluated(node, variation(which, sign * h * size)) for sign in (1.0, -1.0))
             return (triple(ahead, lay.W_NP) - triple(behind, lay.W_NP)) / (2 * h * size)
 
         second_order(lambda h, f=rate: f(0, h), kappa * t + tau * b, 1.0 / size)
@@ -119,10 +125,8 @@ def test_jacobi_fields_match_neighbouring_geodesics(kind: int) -> None:
         _, tau, beta = triple(at, lay.W_KQ)
 
         def rate(which: int, column: int, h: float, node: Array = node, size: float = size) -> Array:
-            d = [0.0, 0.0, 0.0, 0.0]
             step = h * (size if which == 1 else 1.0)
-            d[which] = step
-            ahead, behind = evaluated(node, tuple(d)), evaluated(node, tuple(-x for x in d))
+            ahead, behind = (evaluated(node, variation(which, sign * step)) for sign in (1.0, -1.0))
             return (triple(ahead, column) - triple(behind, column)) / (2 * step)
 
         second_order(lambda h, f=rate: f(1, lay.W_Q, h), a * b, 1.0)

@@ -33,7 +33,8 @@ def perturb(node: Array, rng: np.random.Generator, size: float) -> Array:
     moved = node.copy()
     for k in range(len(node)):
         radius = node[k, lay.DIM]
-        geodesics.displace(k, *(size * rng.normal(size=4) * (radius, radius, 1.0, radius)), moved)
+        slide, shift, turn, lengthen = size * rng.normal(size=4) * (radius, radius, 1.0, radius)
+        geodesics.displace(k, slide, shift, turn, lengthen, moved)
     return moved
 
 
@@ -64,7 +65,8 @@ def test_step_annuls_the_linearised_residual(kinds: str) -> None:
             for sign in (1.0, -1.0):
                 moved = work.copy()
                 for k in range(len(moved)):
-                    geodesics.displace(k, *(sign * eps * step[k]), moved)
+                    slide, shift, turn, lengthen = sign * eps * step[k]
+                    geodesics.displace(k, slide, shift, turn, lengthen, moved)
                 sides.append(residual(moved, ends))
             return (sides[0] - sides[1]) / (2 * eps)
 

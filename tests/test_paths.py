@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -242,6 +244,15 @@ def test_hint_chooses_the_side_and_none_takes_the_shorter() -> None:
     assert lengths[None] == lengths[(0, 1, 0)] < lengths[(0, -1, 0)]
 
 
+def test_a_hint_beside_both_end_points_leads_the_long_way_round() -> None:
+    """Both ends lie on one side of a thin cylinder: the string goes round the other, as MuJoCo's side site asks."""
+    ends = (0.00203496, 0.01186028, 0.0090163), (0.00688629, 0.01398002, -0.02209643)
+    hint = (-0.00632128, -0.007225, 0.0015128)
+    sol = mw.solve_path(*ends, [mw.Obstacle(mw.Cylinder(0.008), hint=hint)])
+    assert sol.converged
+    assert sol.length == pytest.approx(0.06347266, abs=1e-8)  # closed form, swept angle 5.995 rad
+
+
 def test_a_sphere_is_passed_the_shorter_way_whatever_the_hint() -> None:
     """The way round over the top is longest there: a string slips off it, so it is never an answer."""
     for hint in (None, (0, 1, 0), (0, -1, 0)):
@@ -337,21 +348,26 @@ def test_a_sweep_goes_on_after_poses_without_a_path() -> None:
 GOOD = mw.Obstacle(mw.Cylinder(1.0))
 
 
+def wrong(value: Any) -> Any:
+    """Return a value of a type that the call does not take."""
+    return value
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: mw.Cylinder(0.0), "radius must be finite and positive"),
         (lambda: mw.Cylinder(-1.0), "radius"),
         (lambda: mw.Sphere(float("nan")), "Sphere: radius"),
-        (lambda: mw.Sphere("big"), "Sphere: radius"),
-        (lambda: mw.Obstacle(1.0), "surface must be"),
+        (lambda: mw.Sphere(wrong("big")), "Sphere: radius"),
+        (lambda: mw.Obstacle(wrong(1.0)), "surface must be"),
         (lambda: mw.Obstacle(mw.Sphere(1.0), (0, 0)), "pos must have shape"),
         (lambda: mw.Obstacle(mw.Sphere(1.0), quat=(0, 0, 0, 0)), "quat must not be zero"),
         (lambda: mw.Obstacle(mw.Sphere(1.0), hint=(0, np.inf, 0)), "hint must be finite"),
-        (lambda: mw.ViaPoint((0, 0, None)), "ViaPoint: pos"),
+        (lambda: mw.ViaPoint((0, 0, wrong(None))), "ViaPoint: pos"),
         (lambda: mw.solve_path((0, 0), (1, 0, 0)), "origin must have shape"),
         (lambda: mw.solve_path((0, 0, np.nan), (1, 0, 0)), "origin must be finite"),
-        (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), ["cylinder"]), r"obstacles\[0\]"),
+        (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [wrong("cylinder")]), r"obstacles\[0\]"),
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], tol=0.0), "tol must be"),
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], method="magic"), "none of: newton"),
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], lam=1.0), "no options"),
@@ -375,6 +391,6 @@ GOOD = mw.Obstacle(mw.Cylinder(1.0))
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0)).wrenches(np.nan), "tension"),
     ],
 )
-def test_bad_input_is_named(call, message: str) -> None:
+def test_bad_input_is_named(call: Any, message: str) -> None:
     with pytest.raises(mw.GeometryError, match=message):
         call()

@@ -45,11 +45,24 @@ def _free(node, k, sweep):
 
 
 @jit
+def _cross_each_other(ax, ay, px, py, bx, by, qx, qy):
+    """Return whether the straight segments from A to P and from B to Q meet, seen along the axis."""
+    ux, uy, vx, vy = px - ax, py - ay, qx - bx, qy - by
+    determinant = vx * uy - vy * ux
+    if determinant == 0.0:
+        return False
+    wx, wy = ax - bx, ay - by
+    s = (vy * wx - vx * wy) / determinant
+    r = (uy * wx - ux * wy) / determinant
+    return 0.0 <= s <= 1.0 and 0.0 <= r <= 1.0
+
+
+@jit
 def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
     """Return the swept angle for a path that passes a cylinder on the hint's side, at a cold start.
 
-    The straight string stands where it passes on that side, or passes beside the cylinder altogether (the foot of
-    the axis is not between A and B). Otherwise the side whose contact lies nearer to the hint is taken, the rule that
+    The straight string stands where it is free and its point nearest to the axis lies on that side. Otherwise the way
+    round whose middle lies nearer to the hint is taken, be it the long one, unless it crosses itself: the rule that
     MuJoCo's side sites follow (`mju_wrap` in engine_util_misc.c).
     """
     size = math.hypot(hint_x, hint_y)
@@ -57,19 +70,24 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
         return principal
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
-    foot = -(ax * dx + ay * dy) / square if square > 0.0 else 0.0
+    foot = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
     cx, cy = ax + foot * dx, ay + foot * dy
-    if math.hypot(cx, cy) > radius and (cx * hint_x + cy * hint_y >= 0.0 or foot <= 0.0 or foot >= 1.0):
-        return principal
-    if (foot <= 0.0 or foot >= 1.0) and abs(principal) <= alpha_a + alpha_b:
+    if math.hypot(cx, cy) > radius and cx * hint_x + cy * hint_y >= 0.0:
         return principal
     turn = 1.0 if principal >= 0.0 else -1.0
-    middle = math.atan2(ay, ax) + 0.5 * (principal + turn * (alpha_a - alpha_b))
+    start, end = math.atan2(ay, ax), math.atan2(by, bx)
+    middle = start + 0.5 * (principal + turn * (alpha_a - alpha_b))
     towards = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     other = principal - turn * TWO_PI
-    middle = math.atan2(ay, ax) + 0.5 * (other - turn * (alpha_a - alpha_b))
+    middle = start + 0.5 * (other - turn * (alpha_a - alpha_b))
     away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
-    return principal if towards >= away else other
+    if towards >= away:
+        return principal
+    start -= turn * alpha_a
+    end += turn * alpha_b
+    px, py = radius * math.cos(start), radius * math.sin(start)
+    qx, qy = radius * math.cos(end), radius * math.sin(end)
+    return principal if _cross_each_other(ax, ay, px, py, bx, by, qx, qy) else other
 
 
 @jit

@@ -42,10 +42,12 @@ def _owner(model: mujoco.MjModel, what: str, index: int) -> str:
         return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, joint)}')"
     if what == "qvel":
         return f" (joint '{name_of(model, kinds.mjOBJ_JOINT, int(model.dof_jntid[index]))}')"
-    if what == "ctrl":
-        return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, index)}')"
-    if what == "act":
-        first, count = model.actuator_actadr, model.actuator_actnum
+    if what in ("ctrl", "act"):
+        first, count = (
+            (model.actuator_ctrladr, model.actuator_ctrlnum)
+            if what == "ctrl"
+            else (model.actuator_actadr, model.actuator_actnum)
+        )
         actuator = int(np.flatnonzero((first <= index) & (index < first + count))[0])
         return f" (actuator '{name_of(model, kinds.mjOBJ_ACTUATOR, actuator)}')"
     body = int(np.flatnonzero(model.body_mocapid == index // (3 if what == "mocap_pos" else 4))[0])

@@ -10,6 +10,7 @@ import weakref
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels import coupling, readiness
@@ -44,7 +45,6 @@ class MuscleSystem(Results):
         super().__init__(found, build_plan(model, found.muscles), model)
         self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
         self._states: dict[int, State] = {}
-        self._released = False
         self.excitation: Array = np.zeros(self._plan.n)
         self._root = np.asarray(model.body_rootid, dtype=np.int64)
         self._parent = np.asarray(model.body_parentid, dtype=np.int64)
@@ -55,9 +55,9 @@ class MuscleSystem(Results):
     # ----------------------------------------------------------------------------------- evaluation
 
     def _state(self, data: mujoco.MjData) -> State:
-        if self._released:
+        if self._takeover.lost():
             raise ModelError(
-                "this MuscleSystem has given its actuators back (release); build a new one to go on"
+                "the actuators of this model pull by themselves again (release); build a new MuscleSystem to go on"
             )
         if not isinstance(data, mujoco.MjData):
             raise StateError(f"expected an MjData, not {type(data).__name__}")
@@ -94,6 +94,8 @@ class MuscleSystem(Results):
             poses.cvel, poses.subtree_com, self._root, plan.law, plan.params, state.activation,
             state.length, state.velocity, state.tension, state.status,
         )  # fmt: skip
+        if self.model.opt.disableactuator:
+            state.tension[self._disabled()] = 0.0
         coupling.body_wrenches(
             plan.routes,
             plan.weights,
@@ -108,6 +110,15 @@ class MuscleSystem(Results):
         state.time = data.time
         if state.status.any():
             self._failed(state, data)
+
+    def _disabled(self) -> NDArray[np.bool_]:
+        """Return which muscles belong to an actuator group that the model's options switch off."""
+        groups = [
+            int(self.model.actuator_group[muscle.actuator]) if muscle.actuator >= 0 else -1
+            for muscle in self.declarations
+        ]
+        off = int(self.model.opt.disableactuator)
+        return np.array([group >= 0 and bool(off >> group & 1) for group in groups], dtype=np.bool_)
 
     def _failed(self, state: State, data: mujoco.MjData) -> None:
         """Note which muscles have no path; raise where the user asked for that."""
@@ -264,5 +275,4 @@ class MuscleSystem(Results):
 
     def release(self) -> None:
         """Give the native actuators their forces back, as they were; this MuscleSystem can evaluate no more."""
-        self._released = True
         self._takeover.release()
