@@ -69,5 +69,5 @@ def _eye(points: np.ndarray, bodies: np.ndarray) -> rrb.EyeControls3D | None:
     level /= np.linalg.norm(level)
     if (bodies.mean(axis=0) - target) @ level > 0:
         level = -level
-    eye = target + 1.5 * size * (level + np.array([0.0, 0.0, 0.35]))
+    eye = target + 1.35 * size * (level + np.array([0.0, 0.0, 0.35]))
     return rrb.EyeControls3D(position=eye, look_target=target, eye_up=[0.0, 0.0, 1.0])
