@@ -31,11 +31,7 @@ class Plan:
     ctrl_low: Array  # (n,)
     ctrl_high: Array  # (n,)
     times: Array  # (n, 2) activation and deactivation time constants [s]
-
-    @property
-    def has_own(self) -> bool:
-        """Whether mjwrap integrates an activation itself."""
-        return bool((self.source == readiness.OWN).any())
+    has_own: bool  # whether mjwrap integrates an activation itself
 
 
 def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, float, float]:
@@ -94,5 +90,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         source_index=np.array([s[1] for s in sources], dtype=np.int64),
         ctrl_low=np.array([s[2] for s in sources], dtype=np.float64),
         ctrl_high=np.array([s[3] for s in sources], dtype=np.float64),
+        has_own=any(s[0] == readiness.OWN for s in sources),
         times=np.array([declared.activation_times for declared in muscles], dtype=np.float64).reshape(-1, 2),
     )

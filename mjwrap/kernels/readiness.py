@@ -17,6 +17,18 @@ def first_bad(values):
     return -1
 
 
+@jit
+def all_finite(qpos, qvel, act, ctrl, mocap_pos, mocap_quat, excitation):
+    """Return whether every entry of a simulation's state and inputs is finite."""
+    for values in (qpos, qvel, act, ctrl, excitation):
+        if first_bad(values) >= 0:
+            return False
+    for k in range(mocap_pos.shape[0]):
+        if first_bad(mocap_pos[k]) >= 0 or first_bad(mocap_quat[k]) >= 0:
+            return False
+    return True
+
+
 FROM_ACT, FROM_CTRL, OWN, DIRECT = 0, 1, 2, 3  # where a muscle's activation comes from
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
-from mjwrap.kernels import coupling, readiness
+from mjwrap.kernels import coupling, evaluation, readiness
 from mjwrap.mjcf import read_declarations
 from mjwrap.paths import Status
 from mjwrap.plan import build_plan
@@ -23,6 +23,8 @@ from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
 from mjwrap.takeover import Takeover
 
+_RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
+_DISABLE_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 TOLERANCE = 1e-10  # largest tangency error of a path
 
 
@@ -45,6 +47,8 @@ class MuscleSystem(Results):
         super().__init__(found, build_plan(model, found.muscles), model)
         self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
         self._states: dict[int, State] = {}
+        self._groups_off = 0
+        self._off = np.zeros(self._plan.n, dtype=np.bool_)
         self.excitation: Array = np.zeros(self._plan.n)
         self._root = np.asarray(model.body_rootid, dtype=np.int64)
         self._parent = np.asarray(model.body_parentid, dtype=np.int64)
@@ -71,54 +75,39 @@ class MuscleSystem(Results):
 
     def _check(self, data: mujoco.MjData) -> None:
         """Raise `StateError` naming what is not finite."""
+        if readiness.all_finite(
+            data.qpos, data.qvel, data.act, data.ctrl, data.mocap_pos, data.mocap_quat, self.excitation
+        ):
+            return
         check_state(self.model, data)
         bad = readiness.first_bad(self.excitation)
-        if bad >= 0:
-            raise StateError(
-                f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s"
-            )
+        raise StateError(f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s")
 
     def _evaluate(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
         """Paths, activations and tensions from the poses and velocities of `poses`; wrenches into state.wrench."""
         plan = self._plan
-        coupling.solve_routes(
-            plan.routes, plan.links, poses.site_xpos, poses.geom_xpos, poses.geom_xmat, TOLERANCE,
+        failed = evaluation.evaluate(
+            plan.routes, plan.weights, plan.links, plan.law, plan.params,
+            plan.source, plan.source_index, plan.ctrl_low, plan.ctrl_high, self._disabled(), self._root,
+            poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos,
+            data.act, data.ctrl, state.own_now, self.excitation, TOLERANCE,
             state.node, state.segments, state.count, state.info,
+            state.activation, state.length, state.velocity, state.tension, state.status, state.wrench,
         )  # fmt: skip
-        readiness.gather_activation(
-            plan.source, plan.source_index, plan.ctrl_low, plan.ctrl_high,
-            data.act, data.ctrl, state.own_now, self.excitation, state.activation,
-        )  # fmt: skip
-        coupling.drive_muscles(
-            plan.routes, plan.weights, plan.links, state.segments, state.count, state.info,
-            poses.cvel, poses.subtree_com, self._root, plan.law, plan.params, state.activation,
-            state.length, state.velocity, state.tension, state.status,
-        )  # fmt: skip
-        if self.model.opt.disableactuator:
-            state.tension[self._disabled()] = 0.0
-        coupling.body_wrenches(
-            plan.routes,
-            plan.weights,
-            plan.links,
-            state.segments,
-            state.count,
-            state.tension,
-            poses.xipos,
-            state.wrench,
-        )
         self._last = state
         state.time = data.time
-        if state.status.any():
+        if failed:
             self._failed(state, data)
 
     def _disabled(self) -> NDArray[np.bool_]:
-        """Return which muscles belong to an actuator group that the model's options switch off."""
-        groups = [
-            int(self.model.actuator_group[muscle.actuator]) if muscle.actuator >= 0 else -1
-            for muscle in self.declarations
-        ]
+        """Return which muscles (n,) belong to an actuator group that the model's options switch off."""
         off = int(self.model.opt.disableactuator)
-        return np.array([group >= 0 and bool(off >> group & 1) for group in groups], dtype=np.bool_)
+        if off != self._groups_off:
+            actuators = [muscle.actuator for muscle in self.declarations]
+            groups = [int(self.model.actuator_group[a]) if a >= 0 else -1 for a in actuators]
+            self._off = np.array([group >= 0 and bool(off >> group & 1) for group in groups], dtype=np.bool_)
+            self._groups_off = off
+        return self._off
 
     def _failed(self, state: State, data: mujoco.MjData) -> None:
         """Note which muscles have no path; raise where the user asked for that."""
@@ -188,8 +177,8 @@ class MuscleSystem(Results):
         """
         state = self._state(data)
         before = resets(data)
-        runge_kutta = int(self.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
-        silent = bool(int(self.model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION))
+        runge_kutta = int(self.model.opt.integrator) == _RK4
+        silent = bool(int(self.model.opt.disableflags) & _DISABLE_ACTUATION)
         try:
             if runge_kutta:
                 self._step_stages(state, data, nstep)
