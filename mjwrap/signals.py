@@ -28,14 +28,10 @@ class Signal(Protocol):
 
 
 class SmoothSignal(Signal, Protocol):
-    """A signal with two derivatives, which a joint can follow."""
+    """A signal without jumps, which a joint can follow."""
 
     def rate(self, t: float) -> float:
-        """Return the first derivative at time t [1/s]."""
-        ...
-
-    def acceleration(self, t: float) -> float:
-        """Return the second derivative at time t [1/s²]."""
+        """Return the derivative at time t [1/s]."""
         ...
 
 
@@ -49,9 +45,6 @@ class Constant:
         return self.level
 
     def rate(self, t: float) -> float:
-        return 0.0
-
-    def acceleration(self, t: float) -> float:
         return 0.0
 
 
@@ -81,10 +74,6 @@ class Sine:
     def rate(self, t: float) -> float:
         omega = TURN * self.frequency
         return self.amplitude * omega * math.cos(TURN * (self.frequency * t + self.phase))
-
-    def acceleration(self, t: float) -> float:
-        omega = TURN * self.frequency
-        return -self.amplitude * omega**2 * math.sin(TURN * (self.frequency * t + self.phase))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import uuid
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn
 
 try:
     import mujoco
@@ -30,6 +30,9 @@ INTEGRATORS = {
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
 _MYO = "myo_sim:"
+_MYO_NOISE = (
+    "Attaching a spec with an empty prefix"  # myo_sim's models do that; it matters for saving them only
+)
 
 
 class UserError(Exception):
@@ -83,7 +86,7 @@ def _quiet_mujoco(name: str) -> Iterator[None]:
 
     def show(text: str) -> None:
         kind = text.split(".")[0]
-        if kind not in seen:
+        if kind not in seen and not kind.startswith(_MYO_NOISE):
             seen.add(kind)
             print(f"{name}: MuJoCo warns: {' '.join(text.split())}", file=sys.stderr)
 
@@ -198,6 +201,7 @@ class Output:
 
     def __init__(self, path: str, option: str, suffixes: Sequence[str]) -> None:
         self.path, self.option = Path(path), option
+        self._file: IO[str] | None = None
         if self.path.suffix.lower() not in suffixes:
             raise UserError(f"{option} '{path}': the name must end in {' or '.join(suffixes)}")
         if any(other.path.resolve() == self.path.resolve() for other in Output._open):
@@ -212,9 +216,16 @@ class Output:
             raise UserError(f"cannot write {option} '{path}': {_reason(error, self.path)}") from None
         Output._open.append(self)
 
+    def open_text(self) -> IO[str]:
+        """Return the part, open for text; it is closed with the output."""
+        self._file = self.part.open("w", encoding="utf-8", newline="")
+        return self._file
+
     def publish(self) -> None:
         """Put the finished file on the disk and give it its name."""
         with self.writing():
+            if self._file is not None:
+                self._file.close()
             with self.part.open("rb+") as file:
                 os.fsync(file.fileno())
             os.replace(self.part, self.path)
@@ -236,13 +247,16 @@ class Output:
         """Remove every part that has not become a file."""
         for output in cls._open:
             with contextlib.suppress(OSError):
+                if output._file is not None:
+                    output._file.close()
+            with contextlib.suppress(OSError):
                 output.part.unlink(missing_ok=True)
         cls._open.clear()
 
 
 def _reason(error: OSError, path: Path) -> str:
     folder = path.absolute().parent
-    if isinstance(error, FileNotFoundError):
+    if isinstance(error, FileNotFoundError) and not folder.exists():
         existing = next(parent for parent in folder.parents if parent.exists())
         return f"there is no folder '{folder}' (the path exists as far as '{existing}')"
     return (error.strerror or str(error)).lower()

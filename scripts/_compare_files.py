@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from typing import IO, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -37,8 +37,7 @@ class PoseTable:
 
     def __init__(self, output: Output) -> None:
         self._output = output
-        self._file: IO[str] = output.part.open("w", encoding="utf-8", newline="")
-        self._writer = csv.writer(self._file)
+        self._writer = csv.writer(output.open_text())
         with output.writing():
             self._writer.writerow(_HEADER)
 
@@ -58,8 +57,6 @@ class PoseTable:
 
     def close(self) -> None:
         """Finish the file and give it its name."""
-        with self._output.writing():
-            self._file.close()
         self._output.publish()
 
 

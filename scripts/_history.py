@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import IO
-
 import mujoco
 import numpy as np
 from _common import Output
@@ -21,7 +19,7 @@ class CsvWriter:
 
     def __init__(self, output: Output, model: mujoco.MjModel, muscles: MuscleSystem) -> None:
         self._output, self._muscles = output, muscles
-        self._file: IO[str] = output.part.open("w", encoding="utf-8", newline="")
+        self._file = output.open_text()
         actuators = names(model, mujoco.mjtObj.mjOBJ_ACTUATOR, model.nu)
         header = ["time"]
         header += [f"qpos:{name}" for name in qpos_names(model)]
@@ -42,8 +40,6 @@ class CsvWriter:
 
     def close(self) -> None:
         """Finish the file and give it its name."""
-        with self._output.writing():
-            self._file.close()
         self._output.publish()
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from _common import UserError, find_joint
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem
 from mjwrap.errors import SignalError
 from mjwrap.signals import Constant, Sine, SmoothSignal, parse_pattern, read_table
 
 Array = NDArray[np.float64]
+HEAVY = 1e9  # inertia of a prescribed joint, in those of the heaviest one
 
 
 class Spline:
@@ -39,23 +39,19 @@ class Spline:
         return self._at(t, 0)
 
     def rate(self, t: float) -> float:
-        """Return the first derivative at time t."""
+        """Return the derivative at time t."""
         return self._at(t, 1)
-
-    def acceleration(self, t: float) -> float:
-        """Return the second derivative at time t."""
-        return self._at(t, 2)
 
 
 class Prescribed:
     """The prescribed joints of a run.
 
     entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a CSV file with a column `time` and one for
-    each joint. Positions in rad or m.
+    each joint. Positions in rad or m. The joints' armature is changed in `model`.
     """
 
-    def __init__(self, model: mujoco.MjModel, muscles: MuscleSystem, entries: Sequence[str]) -> None:
-        self._model, self._muscles = model, muscles
+    def __init__(self, model: mujoco.MjModel, entries: Sequence[str]) -> None:
+        self._model = model
         found: dict[int, SmoothSignal] = {}
         for entry in entries:
             name, equals, pattern = entry.partition("=")
@@ -69,6 +65,9 @@ class Prescribed:
         self._signals = list(found.values())
         self._qpos = np.array([model.jnt_qposadr[j] for j in found], dtype=np.int64)
         self._dofs = np.array([model.jnt_dofadr[j] for j in found], dtype=np.int64)
+        # Joints so heavy that nothing else can turn them: at every stage of the integrator they do as they are told.
+        self._inertia = HEAVY * float(np.max(model.dof_M0, initial=1e-3))
+        model.dof_armature[self._dofs] = self._inertia
 
     def place(self, data: mujoco.MjData) -> None:
         """Put the joints where they should be at `data.time`, with their speeds."""
@@ -77,18 +76,14 @@ class Prescribed:
             data.qvel[self._dofs] = [signal.rate(data.time) for signal in self._signals]
 
     def drive(self, data: mujoco.MjData) -> None:
-        """Apply the joint forces that give the joints their accelerations, so that other joints feel them."""
-        if not self.joints:
-            return
-        model, dofs = self._model, self._dofs
-        self._muscles.apply(data)
-        data.qfrc_applied[dofs] = 0.0
-        mujoco.mj_forward(model, data)
-        wanted = np.array([signal.acceleration(data.time) for signal in self._signals]) - data.qacc[dofs]
-        unit, answer = np.zeros((len(dofs), model.nv)), np.zeros((len(dofs), model.nv))
-        unit[np.arange(len(dofs)), dofs] = 1.0
-        mujoco.mj_solveM(model, data, answer, unit)
-        data.qfrc_applied[dofs] = np.linalg.solve(answer[:, dofs], wanted)
+        """Apply the joint forces that take the joints through the coming step.
+
+        Their accelerations are the mean ones of the step: right to second order in its length.
+        """
+        if self.joints:
+            now, h = data.time, self._model.opt.timestep
+            change = np.array([signal.rate(now + h) - signal.rate(now) for signal in self._signals])
+            data.qfrc_applied[self._dofs] = self._inertia * change / h
 
 
 def _smooth(name: str, pattern: str) -> SmoothSignal:

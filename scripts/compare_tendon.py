@@ -38,6 +38,7 @@ from _compare_files import PoseTable, print_motion, print_poses, write_json
 
 from mjwrap import MuscleSystem
 from mjwrap.comparison import compare_motion, compare_poses, verdict, with_native_laws
+from mjwrap.excitation import Excitation
 
 
 def read_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -97,7 +98,9 @@ def compare(options: argparse.Namespace) -> int:
     model = load(options.model)
     key = start_keyframe(model, options.keyframe)
     start = start_state(model, key, [])
-    names = choose(model, options.muscles)
+    muscles = MuscleSystem(model)
+    names = choose(muscles, options.muscles)
+    Excitation(muscles, options.excitation, options.seed)  # so that a mistake in it shows before the work
     plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
     facts = Output(options.json, "--json", (".json",)) if options.json else None
     table = Output(options.csv, "--csv", (".csv",)) if options.csv else None
@@ -125,8 +128,8 @@ def compare(options: argparse.Namespace) -> int:
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
         for name, summary in found.muscles.items()
     }
-    muscles = len(found.muscles)
-    print(f"{options.model}: {muscles} muscle{'s' * (muscles != 1)} at {found.poses} poses each")
+    count = len(found.muscles)
+    print(f"{options.model}: {count} muscle{'s' * (count != 1)} at {found.poses} poses each")
     print_poses(found, verdicts)
     if rows is not None:
         rows.close()
@@ -156,10 +159,8 @@ def compare(options: argparse.Namespace) -> int:
     return RUN_FAILED if options.check and wrong else 0
 
 
-def choose(model: mujoco.MjModel, wanted: list[str] | None) -> list[str] | None:
+def choose(muscles: MuscleSystem, wanted: list[str] | None) -> list[str] | None:
     """Return the names of the muscles that the patterns `wanted` match, None for all."""
-    muscles = MuscleSystem(model)
-    muscles.release()
     known = [*muscles.names, *muscles.native]
     if not known:
         raise UserError("the model has no muscles: nothing to compare")

@@ -119,7 +119,7 @@ def simulate(options: argparse.Namespace) -> int:
     muscles = MuscleSystem(model, strict=options.strict)
     data = start_state(model, start_keyframe(model, options.keyframe), options.qpos)
     excitation = Excitation(muscles, options.excitation, options.seed)
-    prescribed = Prescribed(model, muscles, options.prescribe)
+    prescribed = Prescribed(model, options.prescribe)
     check_free(prescribed.joints, options.qpos, model)
 
     plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None

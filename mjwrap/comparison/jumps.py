@@ -53,13 +53,14 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
                 continue
             good = np.ones(len(motion.at), dtype=np.bool_) if program == "MuJoCo" else twin.status == 0
             seen: list[float] = []
-            for k in _candidates(motion, record, good):
+            for k, bend in _candidates(motion, record, good):
                 probe = (
                     _native_probe(comparer, twin, place)
                     if program == "MuJoCo"
                     else _mjwrap_probe(comparer, twin, place, motion, k, poses.base)
                 )
-                jump = _refine(probe, float(motion.at[k]), float(motion.at[k + 1]), float(np.ptp(motion.at)))
+                ends = float(motion.at[k]), float(motion.at[k + 1])
+                jump = _refine(probe, *ends, float(np.ptp(motion.at)), bend)
                 if jump is None or any(abs(jump[0] - other) < 1e-6 for other in seen):
                     continue
                 seen.append(jump[0])
@@ -80,33 +81,44 @@ def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
     return replace(jump, other_smooth=has_path and not jumps_too)
 
 
-def _candidates(motion: Motion, record: PathRecord, good: NDArray[np.bool_]) -> list[int]:
-    """Return the intervals in which length or slope change as a smooth curve would not."""
+def _candidates(
+    motion: Motion, record: PathRecord, good: NDArray[np.bool_]
+) -> list[tuple[int, float | None]]:
+    """Return the intervals in which length (None) or slope (its usual bend) change as a smooth curve would not."""
     h, m, l = np.diff(motion.at), slope(record, motion), record.length
     whole = good[1:] & good[:-1]
     rest = np.where(whole, np.abs(np.diff(l) - 0.5 * h * (m[1:] + m[:-1])), 0.0)
     turn = np.where(whole, np.abs(np.diff(m)), 0.0)
     beside = np.maximum(np.append(turn[1:], 0.0), np.insert(turn[:-1], 0, 0.0))
-    lengths = [k for k in np.argsort(-rest)[:MOST] if rest[k] > 0.5 * LENGTH]
-    slopes = [k for k in np.argsort(-turn)[:MOST] if turn[k] > 2.0 * beside[k] + SLOPE]
-    return sorted({int(k) for k in (*lengths, *slopes)})
+    bends = 0.5 * (np.append(np.diff(m)[1:], 0.0) + np.insert(np.diff(m)[:-1], 0, 0.0)) / h
+    odd_lengths = [int(k) for k in np.argsort(-rest)[:MOST] if rest[k] > 0.5 * LENGTH]
+    odd_slopes = [int(k) for k in np.argsort(-turn)[:MOST] if turn[k] > 2.0 * beside[k] + SLOPE]
+    return [(k, None) for k in odd_lengths] + [(k, float(bends[k])) for k in odd_slopes]
 
 
-def _refine(probe: Probe, low: float, high: float, span: float) -> tuple[float, float, float] | None:
-    """Halve an interval towards its jump; return (place, jump in length, jump in slope), or None if it is smooth."""
+def _refine(
+    probe: Probe, low: float, high: float, span: float, bend: float | None
+) -> tuple[float, float, float] | None:
+    """Halve an interval towards its jump; return (place, jump in length, jump in slope), or None if it is smooth.
+
+    bend: None: follow the half whose length disobeys its slopes more; a number: follow the larger change of slope, less
+    `bend` times the width, which is how the slope changes beside the interval.
+    """
     (l0, m0), (l1, m1) = probe(low), probe(high)
     wide: tuple[float, float] | None = None
     while high - low > NARROW * span:
         middle = 0.5 * (low + high)
         lm, mm = probe(middle)
-        h = middle - low
-        left = abs(lm - l0 - 0.5 * h * (m0 + mm)) / LENGTH + abs(mm - m0) / SLOPE
-        right = abs(l1 - lm - 0.5 * h * (mm + m1)) / LENGTH + abs(m1 - mm) / SLOPE
+        half = 0.5 * (middle - low)
+        left, right = abs(lm - l0 - half * (m0 + mm)), abs(l1 - lm - half * (mm + m1))
+        if bend is not None:
+            left, right = abs(mm - m0 - 2.0 * half * bend), abs(m1 - mm - 2.0 * half * bend)
         if left >= right:
             high, l1, m1 = middle, lm, mm
         else:
             low, l0, m0 = middle, lm, mm
-        if abs(l1 - l0) < LENGTH and abs(m1 - m0) < SLOPE:
+        smooth = abs(l1 - l0) < LENGTH if bend is None else abs(m1 - m0 - 2.0 * half * bend) < SLOPE
+        if smooth:
             return None
         if wide is None and high - low < 1e3 * NARROW * span:
             wide = abs(l1 - l0), abs(m1 - m0)

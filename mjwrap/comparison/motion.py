@@ -14,6 +14,7 @@ from mjwrap.errors import MjwrapError
 from mjwrap.excitation import Excitation
 from mjwrap.mjcf import name_of
 from mjwrap.system import MuscleSystem
+from mjwrap.takeover import Takeover
 
 Array = NDArray[np.float64]
 _UNSTABLE = (
@@ -61,12 +62,18 @@ def unstable(data: mujoco.MjData) -> bool:
     return any(int(data.warning[kind].number) for kind in _UNSTABLE)
 
 
+def pristine(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a copy in which every native actuator pulls, though a `MuscleSystem` may hold the original's still."""
+    with Takeover(model).suspended():
+        return copy.copy(model)
+
+
 def with_native_laws(model: mujoco.MjModel) -> tuple[mujoco.MjModel, list[str]]:
     """Return a copy whose muscles all have MuJoCo's own curves, and the names of those that had another law.
 
     So both runs differ by the path alone. Muscles whose actuator has no muscle curves keep their law.
     """
-    model = copy.copy(model)
+    model = pristine(model)
     dropped = (int(mujoco.mjtObj.mjOBJ_NUMERIC), int(mujoco.mjtObj.mjOBJ_TEXT))
     changed: list[str] = []
     for i in range(model.ntuple):
@@ -104,7 +111,7 @@ def compare_motion(
 
     key: a keyframe to start from, or -1; qpos (nq,): a start position instead. progress is called after every step.
     """
-    native_model, driven_model = copy.copy(model), copy.copy(model)
+    native_model, driven_model = pristine(model), pristine(model)
     muscles = MuscleSystem(driven_model)
     excitation = Excitation(muscles, entries, seed)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.comparison.jumps import Jump, find_jumps
+from mjwrap.comparison.motion import pristine
 from mjwrap.comparison.poses import PoseMaker
 from mjwrap.comparison.twins import Batch, Comparer
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
@@ -57,7 +57,7 @@ def compare_poses(
     qpos0 if None; each: called with every evaluated batch; progress: called with (name, done, all) before each motion.
     Raises `ModelError` for names that are no muscles.
     """
-    model = copy.copy(model)
+    model = pristine(model)
     muscles = MuscleSystem(model)
     known = [*muscles.names, *muscles.native]
     unknown = [name for name in names or () if name not in known]
