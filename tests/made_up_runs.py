@@ -1,0 +1,161 @@
+"""Runs to be recorded whose numbers are made up, each different from all others, and what a recording then holds."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import mujoco
+import numpy as np
+from rerun.chunk import RrdReader
+
+import mjwrap as mw
+
+ROOT = Path(__file__).resolve().parent.parent
+QUANTITIES = ("length", "velocity", "tension", "activation")
+XML = """
+<mujoco model="bench">
+  <asset>
+    <mesh name="wedge" vertex="0 0 0  .1 0 0  0 .1 0  0 0 .1"/>
+    <hfield name="hill" nrow="3" ncol="4" size=".4 .3 .2 .1" elevation="0 0 0 0  0 1 1 0  0 0 0 0"/>
+    <material name="brick" rgba=".8 .2 .1 1"/>
+  </asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 1"/>
+    <geom name="hill" type="hfield" hfield="hill" pos="2 0 0"/>
+    <site name="origin" pos=".2 0 .3"/>
+    <site name="my muscle/2 start" pos=".2 .1 .3"/>
+    <body name="fixed" pos="0 0 .5" euler="0 30 0">
+      <geom name="box" type="box" size=".1 .02 .03" material="brick"/>
+      <geom name="shell" type="box" size=".1 .02 .03" group="3"/>
+    </body>
+    <body name="arm" pos="0 .5 .5">
+      <joint name="hinge" axis="0 1 0"/>
+      <geom name="drum" type="cylinder" size=".05 .12" rgba=".5 .6 .7 1" euler="90 0 0"/>
+      <geom name="ball" type="sphere" size=".03"/>
+      <geom name="egg" type="ellipsoid" size=".03 .04 .05"/>
+      <geom name="pill" type="capsule" size=".02 .1"/>
+      <geom type="mesh" mesh="wedge"/>
+      <site name="via" pos="0 .1 0"/>
+      <site name="insertion" pos="-.2 0 0"/>
+    </body>
+    <body mocap="true" pos="1 0 0"><geom size=".01"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def joined(points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    return np.concatenate(points), np.cumsum([0] + [len(each) for each in points])
+
+
+class Muscles:
+    """MuscleSystem's face over made-up numbers: everything differs in every row, so that mixing any two shows."""
+
+    def __init__(self, model: mujoco.MjModel, names: tuple[str, ...] = ("BIC", "my muscle/2")) -> None:
+        self.n, self.names = len(names), list(names)
+        sites = {name: model.site(name).id for name in ("origin", "via", "insertion")}
+        drum = model.geom("drum").id
+        self.declarations = [
+            SimpleNamespace(
+                name=name,
+                origin_site=sites["origin"] if i == 0 else model.site("my muscle/2 start").id,
+                insertion_site=sites["insertion"],
+                via_sites=[sites["via"]] if i == 0 else [],
+                geoms=[drum] if i == 0 else [],
+            )
+            for i, name in enumerate(names)
+        ]
+        self.time = 0.0
+        self.row = -1
+
+    def forward(self, data: mujoco.MjData) -> None:
+        self.time, self.row = data.time, self.row + 1
+        rng = np.random.default_rng(self.row)
+        self.length, self.velocity, self.tension = rng.normal(size=(3, self.n))
+        self.activation = rng.uniform(size=self.n)
+
+    def poses(self, data: mujoco.MjData) -> mujoco.MjData:
+        return data
+
+    def polylines(self, spacing: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        return joined([self.points(i) for i in range(self.n)])
+
+    def contacts(self) -> tuple[np.ndarray, np.ndarray]:
+        return joined([self.contact_points(i).reshape(-1, 3) for i in range(self.n)])
+
+    def points(self, i: int) -> np.ndarray:
+        count = 2 + (self.row + i) % 3
+        if i == 1 and self.row == 0:
+            count = 0  # no path found yet
+        return np.random.default_rng([self.row, i]).normal(size=(count, 3))
+
+    def contact_points(self, i: int) -> np.ndarray:
+        return np.random.default_rng([self.row, i, 1]).normal(size=((self.row + i) % 2, 2, 3))
+
+
+def simulate(
+    model: mujoco.MjModel, path: Path, steps: int = 100, **options: Any
+) -> tuple[list[SimpleNamespace], Muscles]:
+    """Record `steps` states and return what each of them was."""
+    muscles = Muscles(model)
+    log: list[SimpleNamespace] = []
+    with recorder(model, muscles, path, **options) as record:
+        for data in states(model, muscles, steps):
+            record.log(data)
+            log.append(
+                SimpleNamespace(
+                    time=data.time,
+                    xpos=data.xpos.copy(),
+                    xquat=data.xquat.copy(),
+                    points=[muscles.points(i) for i in range(muscles.n)],
+                    contacts=[muscles.contact_points(i) for i in range(muscles.n)],
+                    **{name: getattr(muscles, name).copy() for name in QUANTITIES},
+                )
+            )
+    return log, muscles
+
+
+def recorder(model: mujoco.MjModel, muscles: Any, path: Path, **options: Any) -> mw.Recorder:
+    """A Recorder that takes `Muscles` for a MuscleSystem."""
+    return mw.Recorder(model, muscles, path, **options)
+
+
+def states(model: mujoco.MjModel, muscles: Muscles, steps: int) -> Iterator[mujoco.MjData]:
+    """`steps` states of the model, 2 ms apart, with joint and mocap body on the move."""
+    data = mujoco.MjData(model)
+    for step in range(steps):
+        data.time = 0.002 * step
+        data.qpos[0] = 0.03 * step
+        data.mocap_pos[0, 2] = 0.01 * step
+        mujoco.mj_kinematics(model, data)
+        muscles.forward(data)
+        yield data
+
+
+def read(path: Path) -> dict[str, dict[str, list[tuple[int | None, Any]]]]:
+    """Everything in a recording: entity, component -> rows (time [ns], None where static; value) by time."""
+    content: dict[str, dict[str, list[tuple[int | None, Any]]]] = {}
+    for chunk in RrdReader(path).store().stream():
+        columns = chunk.to_record_batch()
+        times: list[int | None] = [None] * chunk.num_rows
+        if not chunk.is_static:
+            times = columns.column("sim_time").cast("int64").to_pylist()
+        for name in columns.schema.names:
+            if name not in ("sim_time", "rerun.controls.RowId"):
+                rows = content.setdefault(chunk.entity_path, {}).setdefault(name, [])
+                rows.extend(zip(times, columns.column(name).to_pylist(), strict=True))
+    for components in content.values():
+        for rows in components.values():
+            rows.sort(key=lambda row: row[0] or 0)
+    return content
+
+
+def moving(rows: list[tuple[int | None, Any]]) -> list[tuple[int | None, Any]]:
+    return [row for row in rows if row[0] is not None]
+
+
+def static(content: dict[str, dict[str, list[tuple[int | None, Any]]]], entity: str, component: str) -> Any:
+    ((time_, value),) = content[entity][component]
+    assert time_ is None
+    return value
