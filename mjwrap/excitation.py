@@ -12,6 +12,15 @@ from mjwrap.signals import Signal, parse_pattern, pattern_forms, read_table
 from mjwrap.system import MuscleSystem
 
 
+def control_names(model: Any) -> list[str]:
+    """Return a name for every entry of ctrl: its actuator's, with a number where the actuator has several controls."""
+    found: list[str] = []
+    for i in range(model.nactuator):
+        name, count = model.actuator(i).name or f"#{i}", int(model.actuator_ctrlnum[i])
+        found += [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]
+    return found
+
+
 class Excitation:
     """Signals for the muscles and other actuators of a model.
 
@@ -25,10 +34,10 @@ class Excitation:
         model: Any = muscles.model
         self._muscles = muscles
         self._seed = seed
-        actuators = [model.actuator(i).name or f"#{i}" for i in range(model.nu)]
-        self._places: dict[str, tuple[bool, int]] = {name: (True, i) for i, name in enumerate(actuators)}
-        driven = {muscle.actuator for muscle in muscles.declarations}
-        pulling = [n for i, n in enumerate(actuators) if i in driven or n in muscles.native]
+        controls = control_names(model)
+        self._places: dict[str, tuple[bool, int]] = {name: (True, i) for i, name in enumerate(controls)}
+        driven = {int(model.actuator_ctrladr[m.actuator]) for m in muscles.declarations if m.actuator >= 0}
+        pulling = [n for i, n in enumerate(controls) if i in driven or n in muscles.native]
         for i, muscle in enumerate(muscles.declarations):
             if muscle.actuator < 0:
                 self._places[muscle.name] = (False, i)
@@ -46,7 +55,7 @@ class Excitation:
     def _read(self, entry: str) -> None:
         name, equals, pattern = entry.partition("=")
         if equals:
-            found = fnmatch.filter(self.names, name)
+            found = [name] if name in self._places else fnmatch.filter(self.names, name)
             if not found:
                 known = ", ".join(self.names) or "none"
                 raise SignalError(f"'{entry}': no muscle or actuator '{name}'; there are: {known}")

@@ -8,7 +8,8 @@ from _common import Output
 from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
-from mjwrap.mjcf import name_of, names
+from mjwrap.excitation import control_names
+from mjwrap.mjcf import name_of
 
 Array = NDArray[np.float64]
 MOST = 4000  # samples that a plot keeps; every second one goes when there are more
@@ -20,10 +21,9 @@ class CsvWriter:
     def __init__(self, output: Output, model: mujoco.MjModel, muscles: MuscleSystem) -> None:
         self._output, self._muscles = output, muscles
         self._file = output.open_text()
-        actuators = names(model, mujoco.mjtObj.mjOBJ_ACTUATOR, model.nu)
         header = ["time"]
         header += [f"qpos:{name}" for name in qpos_names(model)]
-        header += [f"ctrl:{name}" for name in actuators]
+        header += [f"ctrl:{name}" for name in control_names(model)]
         for kind in ("activation", "length", "velocity", "tension"):
             header += [f"{kind}:{name}" for name in muscles.names]
         with output.writing():

@@ -118,7 +118,8 @@ def test_the_long_way_round_a_sphere_is_put_to_mujoco() -> None:
     (jump,) = found.jumps
     assert jump.program == "MuJoCo"
     assert jump.other_smooth
-    assert jump.at == pytest.approx(-0.010002, abs=1e-6)  # where the centre lies between the end points
+    # where the centre lies between the end points: -0.010002 in MuJoCo 3.17, 2 µm further in 4.0, whose rule changed
+    assert jump.at == pytest.approx(-0.010003, abs=2e-6)
     assert abs(jump.length) == pytest.approx(0.00119, abs=1e-5)
     without = compare_poses(load(BALL.format(side="")), samples=101)
     assert only(without)[0] == "both"

@@ -168,6 +168,20 @@ def test_a_pattern_drives_muscles_and_leaves_other_actuators_alone(model: mujoco
     assert muscles.names == ["flexor", "extensor", "alone"]
 
 
+def test_an_actuator_with_several_controls_has_a_name_for_each() -> None:
+    text = TWO.replace(
+        '<motor name="drive" joint="hinge"/>', '<orientation name="turn" joint="ball"/>'
+    ).replace(
+        "</worldbody>", '<body><joint name="ball" type="ball"/><geom size=".01" mass="1"/></body></worldbody>'
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    excitation = Excitation(muscles, ["constant:0.3", "turn[1]=constant:2", "extensor=constant:0.5"])
+    assert excitation.names == ["flexor", "turn[0]", "turn[1]", "turn[2]", "extensor", "alone"]
+    excitation.write(data)
+    assert data.ctrl.tolist() == [0.3, 0.0, 2.0, 0.0, 0.5]
+
+
 def test_a_later_entry_wins_and_names_may_be_patterns(model: mujoco.MjModel) -> None:
     muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
     entries = ["constant:0.3", "*x*=constant:0.5", "flexor=constant:0.9", "drive=constant:-2"]
