@@ -187,15 +187,7 @@ def test_a_recording_without_a_state_is_whole(model: mujoco.MjModel, tmp_path: P
     assert read_summary(tmp_path / "run.rrd").states == 0
 
 
-LAGGING = pytest.mark.xfail(
-    not hasattr(mw.MuscleSystem, "poses"),
-    reason="MuscleSystem does not tell whose poses its results belong to",
-)
-
-
-@pytest.mark.parametrize(
-    "evaluate", [pytest.param("forward", marks=LAGGING), pytest.param("apply", marks=LAGGING), "step"]
-)
+@pytest.mark.parametrize("evaluate", ["forward", "apply", "step"])
 def test_bodies_paths_and_time_belong_to_one_state(tmp_path: Path, evaluate: str) -> None:
     """The real thing: MjData may lag behind the muscles, or the muscles behind MjData's clock."""
     elbow = mujoco.MjModel.from_xml_path(str(ROOT / "models/elbow/elbow.xml"))

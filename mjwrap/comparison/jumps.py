@@ -93,7 +93,8 @@ def _candidates(
     bends = 0.5 * (np.append(np.diff(m)[1:], 0.0) + np.insert(np.diff(m)[:-1], 0, 0.0)) / h
     odd_lengths = [int(k) for k in np.argsort(-rest)[:MOST] if rest[k] > 0.5 * LENGTH]
     odd_slopes = [int(k) for k in np.argsort(-turn)[:MOST] if turn[k] > 2.0 * beside[k] + SLOPE]
-    return [*((k, None) for k in odd_lengths), *((k, float(bends[k])) for k in odd_slopes)]
+    found: list[tuple[int, float | None]] = [(k, None) for k in odd_lengths]
+    return found + [(k, float(bends[k])) for k in odd_slopes]
 
 
 def _refine(

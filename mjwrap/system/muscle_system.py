@@ -96,6 +96,7 @@ class MuscleSystem(Results):
         )  # fmt: skip
         self._last = state
         state.time = data.time
+        state.in_scratch = poses is state.scratch
         if failed:
             self._failed(state, data)
 
@@ -144,6 +145,14 @@ class MuscleSystem(Results):
         state = self._state(data)
         state.own_now[:] = state.own
         self._evaluate(state, self._refresh(state, data), data)
+
+    def poses(self, data: mujoco.MjData) -> mujoco.MjData:
+        """Return the data whose `xpos` and `xquat` the results belong to.
+
+        That is `data` itself after `step`, and a copy of ours after `forward` and `apply`, where `data` may lag.
+        """
+        state = self._state(data)
+        return state.scratch if state.in_scratch else data
 
     def apply(self, data: mujoco.MjData) -> None:
         """Do `forward`, then put the wrenches into `data.xfrc_applied`, beside what others have there.

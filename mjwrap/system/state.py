@@ -27,6 +27,7 @@ class State:
         self.written = np.zeros(model.nbody, dtype=np.bool_)
         self.scratch = mujoco.MjData(model)
         self.time = 0.0
+        self.in_scratch = False  # whether the last evaluation read its poses there, or in the caller's data
 
     def forget(self) -> None:
         """Start cold: no branch, no last force, no failures."""
