@@ -296,7 +296,7 @@ class _NoBar:
     def update(self, n: float) -> None:
         """Do nothing."""
 
-    def set_description(self, text: str) -> None:
+    def set_description_str(self, text: str) -> None:
         """Do nothing."""
 
     def close(self) -> None:

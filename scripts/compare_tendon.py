@@ -18,6 +18,7 @@ import argparse
 import fnmatch
 import sys
 from pathlib import Path
+from typing import Any
 
 import mujoco
 from _common import (
@@ -108,14 +109,13 @@ def compare(options: argparse.Namespace) -> int:
         need_matplotlib()
 
     rows = PoseTable(table) if table is not None else None
-    bar = progress_bar(1.0, "", "comparing")
-    done = 0.0
+    bars: list[Any] = []
 
     def advance(name: str, k: int, count: int) -> None:
-        nonlocal done
-        bar.set_description(name)
-        bar.update(k / count - done)
-        done = k / count
+        if not bars:
+            bars.append(progress_bar(count, "motions", "comparing"))
+        bars[0].set_description_str(name)
+        bars[0].update(int(k > 0))
 
     try:
         found = compare_poses(
@@ -123,7 +123,8 @@ def compare(options: argparse.Namespace) -> int:
             base=start.qpos, each=rows.add if rows is not None else None, progress=advance,
         )  # fmt: skip
     finally:
-        bar.close()
+        for bar in bars:
+            bar.close()
     verdicts = {
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
         for name, summary in found.muscles.items()

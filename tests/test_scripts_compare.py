@@ -3,10 +3,12 @@
 import csv
 import json
 import re
+import signal
+import time
 from pathlib import Path
 
 import pytest
-from script_runs import CASE2, ELBOW, Ran, run_here, said
+from script_runs import CASE2, ELBOW, Ran, finish, run_here, said, start
 from test_comparison import BALL
 
 from mjwrap.comparison.twins import Comparer
@@ -72,6 +74,22 @@ def test_where_they_differ_it_says_who_is_right(tmp_path: Path, capsys: pytest.C
     )
     assert "MuJoCo m at slide = -0.0100" in ran.out
     assert "where lengths differ most" in ran.out
+
+
+def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
+    """Half a comparison is none."""
+    outputs = ["--csv", tmp_path / "c.csv", "--json", tmp_path / "j.json"]
+    process = start("compare_tendon", ELBOW, "--samples", 200_000, *outputs)
+    late = time.monotonic() + 60
+    while len(list(tmp_path.iterdir())) < 2:
+        assert time.monotonic() < late, "the comparison did not start"
+        time.sleep(0.1)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    ran = finish(process)
+    assert ran.code == 130, ran.err
+    assert said(ran) == ["compare_tendon: stopped by Ctrl-C"]
+    only_files(tmp_path)
 
 
 def test_check_fails_where_mjwrap_is_wrong(
