@@ -185,6 +185,22 @@ def test_a_fault_of_mjwrap_is_put_to_mjwrap(
     assert summary.bad_poses[0][3].keys() == {"cylinder_y"}
 
 
+def test_a_jump_of_mjwrap_is_found_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Comparer.mjwrap_at
+
+    def torn(self: Comparer, qpos: np.ndarray, qvel: np.ndarray) -> object:
+        length, *rest = sound(self, qpos, qvel)
+        return length + 1e-4 * (qpos[0] > 0.00123), *rest
+
+    monkeypatch.setattr(Comparer, "mjwrap_at", torn)
+    found = compare_poses(mujoco.MjModel.from_xml_path(CASE2), samples=51)
+    (jump,) = found.jumps
+    assert (jump.program, jump.muscle, jump.sweep) == ("mjwrap", "muscle", "cylinder_y")
+    assert jump.at == pytest.approx(0.00123, abs=1e-9)
+    assert jump.length == pytest.approx(1e-4, rel=1e-6)
+    assert "mjwrap jumps 1 time, by up to 0.1 mm" in only(found)[1]
+
+
 def test_muscles_that_cannot_be_compared_say_why() -> None:
     model = mujoco.MjModel.from_xml_path(CASE2.replace("case2", "two_cylinders"))
     found = compare_poses(model, samples=5)
