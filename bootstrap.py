@@ -12,6 +12,7 @@ import argparse
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -89,11 +90,31 @@ def read_stamp(folder: Path) -> dict:
         return {}
 
 
+def write_stamp(folder: Path, stamp: dict) -> None:
+    """Mark `folder` as made here; an empty stamp says that it is not finished."""
+    (folder / STAMP).write_text(json.dumps(stamp, indent=1), encoding="utf-8")
+
+
 def is_ready(folder: Path, wanted: dict) -> bool:
     """True where the environment in `folder` has everything that `wanted` names, from the same project file."""
     found = read_stamp(folder)
     same = all(found.get(key) == wanted[key] for key in ("project", "python", "mujoco"))
     return same and set(wanted["extras"]) <= set(found.get("extras", [])) and interpreter(folder).exists()
+
+
+def make(folder: Path, version: str) -> None:
+    """Make an empty environment in `folder`, in the place of an earlier one made here."""
+    if folder.exists() and not (folder / STAMP).exists():
+        raise SetupError(f"{folder} is there, but this script did not make it: move it away, or remove it")
+    say(f"making {folder.name} with Python {version}")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    write_stamp(folder, {})
+    made = subprocess.run([sys.executable, "-m", "venv", str(folder)], env=environment())
+    if made.returncode:
+        raise SetupError(
+            f"the virtual environment {folder.name} could not be made (see above)", made.returncode
+        )
 
 
 def prepare(extras: "set[str]", mujoco: int) -> Path:
@@ -109,14 +130,9 @@ def prepare(extras: "set[str]", mujoco: int) -> Path:
     found = read_stamp(folder)
     if python.exists() and all(found.get(key) == wanted[key] for key in ("python", "mujoco")):
         wanted["extras"] = sorted(extras | set(found["extras"]))
-        (folder / STAMP).unlink()
+        write_stamp(folder, {})
     else:
-        say(f"making {folder.name} with Python {wanted['python']}")
-        make = subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], env=environment())
-        if make.returncode:
-            raise SetupError(
-                f"the virtual environment {folder.name} could not be made (see above)", make.returncode
-            )
+        make(folder, wanted["python"])
 
     say(
         f"installing mjwrap[{','.join(wanted['extras'])}] with {wanted['mujoco']} (takes minutes the first time)"
@@ -130,7 +146,7 @@ def prepare(extras: "set[str]", mujoco: int) -> Path:
             "first run cannot work; behind a proxy or mirror, pip reads HTTPS_PROXY and PIP_INDEX_URL",
             install.returncode,
         )
-    (folder / STAMP).write_text(json.dumps(wanted, indent=1), encoding="utf-8")
+    write_stamp(folder, wanted)
     say(f"{folder.name} is ready after {time.monotonic() - started:.0f} s")
     return python
 

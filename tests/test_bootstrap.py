@@ -60,15 +60,31 @@ def test_a_python_without_venv_is_told_how_to_get_it(
     assert "apt install python3-venv" in capsys.readouterr().err
 
 
-def test_a_failed_installation_keeps_pips_code_and_leaves_no_stamp(
+def test_somebody_elses_environment_is_left_alone(
+    bootstrap: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands = Commands()
+    monkeypatch.setattr(bootstrap.subprocess, "run", commands)
+    mine = bootstrap.ROOT / ".venv" / "mine"
+    mine.parent.mkdir()
+    mine.touch()
+    assert bootstrap.main(["test"]) == 1
+    assert "did not make it" in capsys.readouterr().err
+    assert mine.exists()
+    assert commands.ran == []
+
+
+def test_a_failed_installation_keeps_pips_code_and_is_made_anew(
     bootstrap: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     commands = Commands(failing="pip", code=23)
     monkeypatch.setattr(bootstrap.subprocess, "run", commands)
     assert bootstrap.main(["test"]) == 23
     assert "network" in capsys.readouterr().err
-    assert not (bootstrap.ROOT / ".venv" / bootstrap.STAMP).exists()
     assert commands.count("pytest") == 0
+    commands.failing = ""
+    assert bootstrap.main(["test"]) == 0
+    assert (commands.count("venv"), commands.count("pip"), commands.count("pytest")) == (2, 2, 1)
 
 
 def test_an_environment_is_used_again_until_the_project_file_changes(
