@@ -45,7 +45,7 @@ from _common import (
 from _history import CsvWriter, History
 from _prescribe import Prescribed, check_free
 
-from mjwrap import MuscleSystem, Recorder
+from mjwrap import MuscleSystem, Recorder, Status
 from mjwrap.errors import RecordingError
 from mjwrap.excitation import Excitation
 
@@ -168,6 +168,9 @@ def advance(
     prescribed.place(data)
     excitation.write(data)
     muscles.forward(data)  # compiles where that is still to do, before the clock starts
+    inside = [i for i, status in enumerate(muscles.status) if status == Status.ENDPOINT_INSIDE]
+    for i in inside[:1]:
+        raise UserError(f"muscle '{muscles.names[i]}' has no path at the start: {muscles.reason(i)}")
     started = time.perf_counter()
     bar = progress_bar(steps * timestep, "s", "simulating")
     try:

@@ -270,17 +270,25 @@ def test_a_motion_that_blows_up_is_told_and_leaves_nothing(
 def test_a_path_that_is_not_found_is_counted_or_stops_a_strict_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The insertion starts inside the ball, where there is no path."""
+    """The insertion swings into the ball and out again; where it starts inside there is nothing to hold."""
     model = tmp_path / "m.xml"
     model.write_text(ENTERS)
-    options = [model, "--duration", 0.01, "--qpos", "slide=-0.09", "--csv", tmp_path / "c.csv"]
-    ran = simulate(capsys, *options, "--strict")
+    options = [model, "--duration", 0.01, "--csv", tmp_path / "c.csv"]
+    swing = ["--prescribe", "slide=sine:-0.09,50"]
+    ran = simulate(capsys, *options, *swing, "--strict")
     assert ran.code == 1
-    assert re.match("simulate: .*'stuck'.*inside", said(ran)[-1])
+    assert re.match("simulate: .*'stuck'.*site 'b' is inside geom 'ball'", said(ran)[-1])
     only_files(tmp_path, "m.xml")
-    ran = simulate(capsys, *options)
+    ran = simulate(capsys, *options, "--qpos", "slide=-0.09")
+    assert ran.code == 2
+    assert re.match(
+        "simulate: muscle 'stuck' has no path at the start.*site 'b' is inside geom 'ball'", said(ran)[-1]
+    )
+    only_files(tmp_path, "m.xml")
+    ran = simulate(capsys, *options, *swing)
     assert (ran.code, said(ran)) == (0, [])
-    assert "stuck: 5 steps without a path" in ran.out
+    assert "stuck: 4 steps without a path" in ran.out
+    assert "site 'b' is inside geom 'ball'" in ran.out
     only_files(tmp_path, "m.xml", "c.csv")
 
 

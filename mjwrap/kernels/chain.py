@@ -8,6 +8,7 @@ import numpy as np
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.certify import minimal
 from mjwrap.kernels.geodesics import displace
 from mjwrap.kernels.newton import evaluate
 from mjwrap.kernels.relax import path_length
@@ -67,8 +68,12 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
 
 @jit
 def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
-    """Evaluate the path that the rows hold, without changing it; length and tangency error go to info[row]."""
+    """Evaluate the path that the rows hold, without changing it; length and tangency error go to info[row].
+
+    The status is CONVERGED, or NOT_MINIMAL where a string would slip off; the tangency error is left to the caller.
+    """
     total, square = 0.0, 0.0
+    status = lay.CONVERGED
     ax, ay, az = 0.0, 0.0, 0.0
     start = lo
     for k in range(lo, hi + 1):
@@ -79,11 +84,14 @@ def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
         ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
         square += evaluate(start, k, ends, node)
+        if not minimal(start, k, node):
+            status = lay.NOT_MINIMAL
         total += path_length(start, k, ends, node)
         ax, ay, az = bx, by, bz
         start = k + 1
     info[row, I_LENGTH] = total
     info[row, I_ERROR] = math.sqrt(square)
+    info[row, I_STATUS] = status
 
 
 @jit
@@ -145,6 +153,10 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
             0, n, x, y, z, insertion[j, 0], insertion[j, 1], insertion[j, 2], node, tol, False, info, j
         )
         if warm and info[j, I_STATUS] != lay.CONVERGED:
-            for k in range(n):  # go on from the last pose that was solved
+            for k in range(
+                n
+            ):  # go on from the last pose that was solved, or cold from where an end was inside
                 for i in range(lay.STATE):
                     node[k, S_MODE + i] = before[k, i]
+                if info[j, I_STATUS] == lay.ENDPOINT_INSIDE:
+                    node[k, S_MODE] = lay.COLD

@@ -53,7 +53,7 @@ def _place(lo, hi, links, site_xpos, geom_xpos, geom_xmat, node):
 
 @jit
 def _roll_back(lo, hi, cold, node):
-    """After a pose without a path: go on from the last solution, or start cold again where there was none."""
+    """After a pose without a path: go on from the last solution, or start cold where there is none to go on from."""
     for k in range(lo, hi):
         if cold:
             node[k, lay.S_MODE] = lay.COLD
@@ -75,7 +75,10 @@ def solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg,
         if info[c, lay.I_STATUS] == lay.CONVERGED:
             seg_count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
         else:
-            _roll_back(lo, hi, cold, node)
+            inside = (
+                info[c, lay.I_STATUS] == lay.ENDPOINT_INSIDE
+            )  # where a string comes out again is anybody's guess
+            _roll_back(lo, hi, cold or inside, node)
 
 
 @jit
@@ -261,8 +264,9 @@ def take_back(xfrc, others, mine, total, written):
     """Leave in xfrc_applied (nbody, 6) what others put there.
 
     Rows still as mjwrap wrote them get others' share back to the bit. Where a row was set to zero since then (a reset,
-    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back. From
-    rows that others have changed otherwise, mjwrap's last contribution is subtracted.
+    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back, nor
+    where others have assigned the same again. From rows that others have changed otherwise, mjwrap's last contribution
+    is subtracted.
     """
     cleared, untouched = False, False
     for b in range(xfrc.shape[0]):
@@ -277,14 +281,15 @@ def take_back(xfrc, others, mine, total, written):
     for b in range(xfrc.shape[0]):
         if not written[b]:
             continue
-        zero, same = True, True
+        zero, same, assigned = True, True, True
         for i in range(6):
             zero = zero and xfrc[b, i] == 0.0
             same = same and xfrc[b, i] == total[b, i]
+            assigned = assigned and xfrc[b, i] == others[b, i]
         for i in range(6):
             if same:
                 xfrc[b, i] = others[b, i]
-            elif not (zero or cleared):
+            elif not (zero or cleared or assigned):
                 xfrc[b, i] -= mine[b, i]
         written[b] = False
 

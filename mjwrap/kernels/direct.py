@@ -24,6 +24,7 @@ INSIDE = 1.0 - 1e-9  # a point closer to the axis than this share of the radius 
 ON_SURFACE = 2e-9  # a straight segment shorter than this share of the radius ends on the surface, no tangent is shorter
 CLEAR = 1e-12  # a wrap that would bend the string by less [rad] counts as not touching
 TWO_PI = 2.0 * math.pi
+SMALL_TURN = 0.5 * math.pi  # a change of the swept angle that can only be a continuous motion [rad]
 A_INSIDE = 1
 B_INSIDE = 2
 
@@ -32,6 +33,19 @@ B_INSIDE = 2
 def nearest_turn(angle, reference):
     """Return the angle that equals `angle` modulo 2 pi and lies nearest to `reference` [rad]."""
     return angle + TWO_PI * math.floor((reference - angle) / TWO_PI + 0.5)
+
+
+@jit
+def follow(angle, before):
+    """Return the swept angle that equals `angle` modulo 2 pi and continues `before` [rad].
+
+    A string winds beyond one turn only in small steps: after a large jump nobody can tell, and the way within one turn
+    is taken.
+    """
+    angle = nearest_turn(angle, before)
+    if abs(angle) > TWO_PI and abs(angle - before) > SMALL_TURN:
+        angle -= math.copysign(TWO_PI, angle)
+    return angle
 
 
 @jit
@@ -101,7 +115,7 @@ def _wrap_cylinder(k, radius, ax, ay, az, bx, by, bz, node):
     alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     if node[k, S_MODE] != lay.COLD:
-        sweep = nearest_turn(sweep, node[k, S_SWEEP])
+        sweep = follow(sweep, node[k, S_SWEEP])
     elif node[k, HINT] != 0.0:
         sweep = _hinted_sweep(
             ax, ay, bx, by, sweep, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], radius

@@ -8,12 +8,10 @@ contact points (each such wrap shortens the path), and Newton's method polishes 
 
 from __future__ import annotations
 
-import math
-
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import minimal, swept
-from mjwrap.kernels.direct import A_INSIDE, B_INSIDE, holds, wrap
+from mjwrap.kernels.direct import A_INSIDE, B_INSIDE, follow, holds, wrap
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.relax import path_length, relax, shorten
@@ -63,7 +61,7 @@ def _follow_branch(lo, hi, node):
     for k in range(lo, hi):
         if node[k, S_MODE] == TOUCHED and node[k, KIND] == lay.CYLINDER:
             angle = swept(k, node)
-            if abs(angle - node[k, S_SWEEP]) > math.pi:
+            if abs(angle - follow(angle, node[k, S_SWEEP])) > 1.0:
                 same = False
             else:
                 node[k, S_SWEEP] = angle

@@ -53,7 +53,9 @@ class PathSolution:
         self.tangency_error = float(info[layout.I_ERROR])
         self.iterations = int(info[layout.I_ITERATIONS])
         self.evaluations = int(info[layout.I_EVALUATIONS])
-        self._saved = self._node[:, SAVED].copy() if self.converged else saved_before
+        self._saved = self._node[:, SAVED].copy() if self.converged else saved_before.copy()
+        if self.status == Status.ENDPOINT_INSIDE:
+            self._saved[:, 0] = layout.COLD  # where a string comes out again is anybody's guess
         self._count = segments.list_segments(*self._ends, self._node, self._segments, 0)
         self.contacts = [self._contact(k) for k in range(len(self._node))]
 

@@ -38,7 +38,8 @@ def solve_path(
 
     origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
     an earlier solution for the same obstacles elsewhere, whose branch (side, winding) is kept; tol: largest tangency
-    error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`).
+    error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`), which
+    ignore hints and may find a path that winds further than a string would.
     Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
     """
     if not (np.isfinite(tol) and tol > 0.0):
@@ -91,7 +92,8 @@ def _solve_with(
         first, here = stop + 1, there
     chain.evaluate_chain(0, len(node), *origin, *insertion, node, info, 0)
     good = good and info[0, layout.I_ERROR] <= tol
-    info[0, layout.I_STATUS] = layout.CONVERGED if good else layout.NOT_CONVERGED
+    if not good:
+        info[0, layout.I_STATUS] = layout.NOT_CONVERGED
     info[0, layout.I_ITERATIONS] = iterations
     info[0, layout.I_EVALUATIONS] = evaluations
 

@@ -61,6 +61,8 @@ def solve_sweep(
     pos (T, n, 3), quat (T, n, 4) w, x, y, z: their poses. warm: each pose starts from the ones before and keeps their
     branch, else each starts cold. Raises `GeometryError` for arrays of other shapes or not finite.
     """
+    if not (np.isfinite(tol) and tol > 0.0):
+        raise GeometryError(f"tol must be finite and positive, not {tol!r}")
     n = len(obstacles)
     node = pack(obstacles)
     shape = np.shape(pos)

@@ -143,9 +143,9 @@ class Ragged:
             starts[:, :-1] + before[:, np.newaxis]
         ).T.ravel()  # where each muscle's points of a frame begin
         ends = np.cumsum(counts)
-        order = np.arange(ends[-1]) + np.repeat(blocks - ends + counts, counts)
+        order = np.arange(counts.sum()) + np.repeat(blocks - ends + counts, counts)
         points = np.concatenate(self._points[:frames], dtype=np.float32)
-        return points.take(order, axis=0), counts
+        return points.take(order.astype(np.intp), axis=0), counts
 
 
 def _one_each(rows: int) -> pa.Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjwrap.errors import StateError
 from mjwrap.kernels import readiness
-from mjwrap.mjcf import name_of
+from mjwrap.mjcf import MuscleDeclaration, name_of
 
 _BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
 _BADQVEL = int(mujoco.mjtWarning.mjWARN_BADQVEL)
@@ -18,6 +18,30 @@ def resets(data: mujoco.MjData) -> int:
     """Return how often MuJoCo has found the state not finite or too large; it resets the data then."""
     number = data.warning.number
     return int(number[_BADQPOS]) + int(number[_BADQVEL]) + int(number[_BADQACC])
+
+
+def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> str:
+    """Return which sites of a muscle lie inside the geoms next to them at the given poses, or an empty string."""
+    found = []
+    for route in muscle.routes:
+        stops = [route.origin, *(node.site for node in route.nodes), route.insertion]
+        for place, node in enumerate(route.nodes, start=1):
+            if node.geom < 0:
+                continue
+            beside = (
+                next(s for s in stops[place - 1 :: -1] if s >= 0),
+                next(s for s in stops[place:] if s >= 0),
+            )
+            for site in dict.fromkeys(beside):
+                local = poses.geom_xmat[node.geom].reshape(3, 3).T @ (
+                    poses.site_xpos[site] - poses.geom_xpos[node.geom]
+                )
+                flat = int(model.geom_type[node.geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+                if np.linalg.norm(local[:2] if flat else local) < model.geom_size[node.geom, 0]:
+                    inner = name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
+                    outer = name_of(model, mujoco.mjtObj.mjOBJ_GEOM, node.geom)
+                    found.append(f"site '{inner}' is inside geom '{outer}'")
+    return "; ".join(found)
 
 
 def check_state(model: mujoco.MjModel, data: mujoco.MjData) -> None:

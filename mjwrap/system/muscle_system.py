@@ -18,7 +18,7 @@ from mjwrap.mjcf import read_declarations
 from mjwrap.paths import Status
 from mjwrap.plan import build_plan
 from mjwrap.system.callback import control_callback
-from mjwrap.system.checks import check_state, resets
+from mjwrap.system.checks import check_state, ends_inside, resets
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
 from mjwrap.takeover import Takeover
@@ -39,6 +39,10 @@ class MuscleSystem(Results):
     """
 
     def __init__(self, model: mujoco.MjModel, *, strict: bool = False) -> None:
+        if not isinstance(model, mujoco.MjModel):
+            raise ModelError(
+                f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
+            )
         self.model = model
         self.strict = strict
         self._takeover = Takeover(model)
@@ -98,7 +102,7 @@ class MuscleSystem(Results):
         state.time = data.time
         state.in_scratch = poses is state.scratch
         if failed:
-            self._failed(state, data)
+            self._failed(state, poses, data)
 
     def _disabled(self) -> NDArray[np.bool_]:
         """Return which muscles (n,) belong to an actuator group that the model's options switch off."""
@@ -110,10 +114,14 @@ class MuscleSystem(Results):
             self._groups_off = off
         return self._off
 
-    def _failed(self, state: State, data: mujoco.MjData) -> None:
+    def _failed(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
         """Note which muscles have no path; raise where the user asked for that."""
         bad = np.flatnonzero(state.status)
-        state.last_failure[bad] = state.status[bad]
+        for i in bad:
+            if state.last_failure[i] != state.status[i]:
+                inside = state.status[i] == Status.ENDPOINT_INSIDE
+                state.details[i] = ends_inside(self.model, poses, self.declarations[i]) if inside else ""
+            state.last_failure[i] = state.status[i]
         first = int(bad[0])
         if (state.status == Status.NON_FINITE).any():
             first = int(np.flatnonzero(state.status == Status.NON_FINITE)[0])
@@ -121,8 +129,7 @@ class MuscleSystem(Results):
                 f"muscle '{self.names[first]}': a pose or force is not finite at time {data.time:g} s"
             )
         if self.strict:
-            reason = Status(int(state.status[first])).message
-            raise PathError(f"muscle '{self.names[first]}' at time {data.time:g} s: {reason}")
+            raise PathError(f"muscle '{self.names[first]}' at time {data.time:g} s: {self.reason(first)}")
 
     def _refresh(self, state: State, data: mujoco.MjData) -> mujoco.MjData:
         """Return scratch data with the kinematics of the present qpos and qvel; `data` may lag by a step."""
@@ -158,7 +165,8 @@ class MuscleSystem(Results):
         """Do `forward`, then put the wrenches into `data.xfrc_applied`, beside what others have there.
 
         The last call's contribution is taken back first. Right for one following `mj_step` with an Euler or implicit
-        integrator; under RK4 use `step`, which evaluates at every stage.
+        integrator; under RK4 use `step`, which evaluates at every stage. Others may add to `xfrc_applied` or set all
+        of it between calls; who assigns changing forces to single rows should use `step`, which leaves theirs alone.
         """
         self.forward(data)
         state = self._last
@@ -184,6 +192,8 @@ class MuscleSystem(Results):
         Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds other people's contributions only.
         Raises `StateError` for a state that is not finite, and where MuJoCo finds the motion unstable and resets it.
         """
+        if nstep < 0:
+            raise StateError(f"nstep must not be negative, got {nstep}")
         state = self._state(data)
         before = resets(data)
         runge_kutta = int(self.model.opt.integrator) == _RK4
@@ -228,12 +238,12 @@ class MuscleSystem(Results):
     def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> None:
         """Runge-Kutta: act in MuJoCo's control callback, which it calls at every stage."""
         plan = self._plan
-        address, start = data._address, data.time
+        start = data.time
         failed = np.zeros(plan.n, dtype=np.bool_)
         caught: list[Exception] = []
 
-        def act(stage: mujoco.MjData) -> None:
-            if stage._address != address or caught:
+        def act() -> None:
+            if caught:
                 return
             try:
                 if plan.has_own:
@@ -246,7 +256,7 @@ class MuscleSystem(Results):
             except Exception as error:  # an exception must not cross MuJoCo's C frames; it is raised below
                 caught.append(error)
 
-        with control_callback(act, lambda: self._take_back(state, data)):
+        with control_callback(data, act, lambda: self._take_back(state, data)):
             for _ in range(nstep):
                 self._check(data)
                 start = data.time

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Results:
-    """Lengths, velocities, tensions, statuses and paths at the last evaluation.
+    """Lengths, velocities, tensions, statuses and paths at the last evaluation, as copies that stay as they are.
 
     declarations: what the model declares, one per muscle; native: muscle actuators that stay with MuJoCo, and why.
     """
@@ -41,27 +41,27 @@ class Results:
     @property
     def length(self) -> Array:
         """Musculotendon lengths (n,) [m]."""
-        return self._last.length
+        return self._last.length.copy()
 
     @property
     def velocity(self) -> Array:
         """Lengthening speeds (n,) [m/s]."""
-        return self._last.velocity
+        return self._last.velocity.copy()
 
     @property
     def tension(self) -> Array:
         """Tensions (n,) [N], never negative."""
-        return self._last.tension
+        return self._last.tension.copy()
 
     @property
     def activation(self) -> Array:
         """Activations (n,) [-]."""
-        return self._last.activation
+        return self._last.activation.copy()
 
     @property
     def status(self) -> NDArray[np.int64]:
         """Codes of `mjwrap.Status` (n,)."""
-        return self._last.status
+        return self._last.status.copy()
 
     @property
     def time(self) -> float:
@@ -71,7 +71,7 @@ class Results:
     @property
     def failures(self) -> NDArray[np.int64]:
         """Number of steps (n,) at which a muscle's path was not found and its last good force was held."""
-        return self._last.failures
+        return self._last.failures.copy()
 
     def index(self, name: str) -> int:
         """Return the index of a muscle by name; `GeometryError` lists the names where there is no such muscle."""
@@ -79,14 +79,19 @@ class Results:
             raise GeometryError(f"no muscle '{name}'; muscles: {', '.join(self.names) or 'none'}")
         return self.names.index(name)
 
+    def reason(self, i: int) -> str:
+        """Return why muscle i last had no path, with the elements at fault; empty if it always had one."""
+        code = int(self._last.last_failure[i])
+        detail = self._last.details[i]
+        return (Status(code).message + (f" ({detail})" if detail else "")) if code else ""
+
     def report(self) -> str:
         """Return one line per muscle whose path was not found on some steps, with the reason; empty if none."""
         lines = []
         for i, count in enumerate(self.failures):
             if count:
-                reason = Status(int(self._last.last_failure[i])).message
                 lines.append(
-                    f"{self.names[i]}: {count} step{'s' if count != 1 else ''} without a path; at last {reason}"
+                    f"{self.names[i]}: {count} step{'s' if count != 1 else ''} without a path; at last {self.reason(i)}"
                 )
         return "\n".join(lines)
 

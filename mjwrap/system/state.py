@@ -22,6 +22,7 @@ class State:
         self.status = np.zeros(n, dtype=np.int64)
         self.failures = np.zeros(n, dtype=np.int64)
         self.last_failure = np.zeros(n, dtype=np.int64)
+        self.details = [""] * n  # which elements are to blame for the last failure
         self.own, self.own_now = np.zeros(n), np.zeros(n)
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)
