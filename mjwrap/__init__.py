@@ -28,14 +28,19 @@ if TYPE_CHECKING:
         solve_sweep,
     )
     from mjwrap.recording import Recorder
-    from mjwrap.surfaces import Cylinder, Sphere
+    from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Torus
     from mjwrap.system import MuscleSystem
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Capsule": "surfaces",
+    "Cone": "surfaces",
     "Cylinder": "surfaces",
+    "Ellipsoid": "surfaces",
+    "EllipticCylinder": "surfaces",
     "Sphere": "surfaces",
+    "Torus": "surfaces",
     "Contact": "paths",
     "Obstacle": "paths",
     "PathSolution": "paths",
@@ -52,9 +57,13 @@ _HOMES = {
 }
 
 __all__ = [
+    "Capsule",
+    "Cone",
     "Contact",
     "Cylinder",
     "DeGrooteFregly2016",
+    "Ellipsoid",
+    "EllipticCylinder",
     "GeometryError",
     "MjwrapError",
     "ModelError",
@@ -71,6 +80,7 @@ __all__ = [
     "StateError",
     "Status",
     "SweepSolution",
+    "Torus",
     "ViaPoint",
     "solve_path",
     "solve_sweep",

@@ -63,7 +63,8 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
                 row[layout.S_MODE] = layout.COLD
                 if node.geom >= 0:
                     row[layout.KIND] = SURFACES[int(model.geom_type[node.geom])]
-                    row[layout.DIM] = model.geom_size[node.geom, 0]
+                    row[layout.DIM] = row[layout.SIZE] = model.geom_size[node.geom, 0]
+                    row[layout.DIM + 1] = np.inf  # MuJoCo wraps cylinders of any length
                     body = int(model.geom_bodyid[node.geom])
                 else:
                     body = int(model.site_bodyid[node.site])

@@ -5,7 +5,8 @@ float64 array `node` (N, ROW): one argument instead of seven halves the cost of 
 references on every array that it hands on. A row holds, in this order:
 
     KIND        VIA, CYLINDER, SPHERE, ...
-    DIM   (4)   sizes of the surface [m]
+    DIM   (4)   sizes of the surface [m], in the order of its class in `mjwrap/surfaces.py`
+    SIZE        length by which steps on the surface are limited, about its smallest radius of curvature [m]
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
     HINT  (4)   flag (0 or 1), then the hint in S [m]
@@ -15,14 +16,21 @@ references on every array that it hands on. A row holds, in this order:
 
 KIND = 0
 DIM = 1
-POS = 5
-ROT = 8
-HINT = 17
+SIZE = 5
+POS = 6
+ROT = 9
+HINT = 18
 
 # ----------------------------------------------------------------------------------------- kinds of nodes
 VIA = 0
-CYLINDER = 1
-SPHERE = 2
+CYLINDER = 1  # DIM: radius, half length (infinite: inf)
+SPHERE = 2  # DIM: radius
+ELLIPSOID = 3  # DIM: three semi-axes
+ELLIPTIC_CYLINDER = 4  # DIM: two semi-axes, half length
+TORUS = 5  # DIM: major radius, minor radius
+CONE = 6  # DIM: radius at z = 0, slope (radius gained per length along z), half length
+CAPSULE = 7  # DIM: radius, half length of the cylinder
+CUSTOM = 8  # DIM: unused, then three addresses of compiled functions, see `custom.py`
 
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0
@@ -31,13 +39,15 @@ ENDPOINT_INSIDE = 2
 NOT_MINIMAL = 3
 PENETRATING = 4
 NON_FINITE = 5
+OUT_OF_RANGE = 6
+NO_GEODESIC = 7
 
 # ------------------------------------------------------------------------ columns of the saved solution
-S_MODE = 21  # COLD, FREE or TOUCHED
-S_SWEEP = 22  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
-S_P = 23  # first contact point P in S (3) [m]
-S_T = 26  # unit tangent at P in S (3)
-S_ARC = 29  # arc length s [m]
+S_MODE = 22  # COLD, FREE or TOUCHED
+S_SWEEP = 23  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
+S_P = 24  # first contact point P in S (3) [m]
+S_T = 27  # unit tangent at P in S (3)
+S_ARC = 30  # arc length s [m]
 STATE = 9  # how many they are
 
 COLD = -1.0
@@ -45,27 +55,29 @@ FREE = 0.0
 TOUCHED = 1.0
 
 # -------------------------------------------------------------------- columns of results and scratch
-W_P = 30  # P (3), then Q, t_P, t_Q, n_P, n_Q, b_P, b_Q (3 each)
-W_Q = 33
-W_TP = 36
-W_TQ = 39
-W_NP = 42
-W_NQ = 45
-W_BP = 48
-W_BQ = 51
-W_KP = 54  # kappa, tau, beta at P
-W_KQ = 57  # kappa, tau, beta at Q
-W_JAC = 60  # Jacobi fields a, a', r, r' at Q
-W_E = 64  # unit vector of the straight segment that arrives at P (3)
-W_L = 67  # its length [m]
-W_CP = 68  # e.t, e.n, e.b at P (3)
-W_CQ = 71  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves
-W_LQ = 74  # length of the segment that leaves [m]
-W_EQ = 75  # its unit vector (3)
-W_Y = 78  # block elimination: solution for the right-hand side (4)
-W_X = 82  # block elimination: solution for the upper coupling (4 x 2)
-W_SAVE = 90  # P, t, s before a trial step (7)
-W_OLD = 97  # the saved solution from which the solve started (9)
+W_P = 31  # P (3), then Q, t_P, t_Q, n_P, n_Q, b_P, b_Q (3 each)
+W_Q = 34
+W_TP = 37
+W_TQ = 40
+W_NP = 43
+W_NQ = 46
+W_BP = 49
+W_BQ = 52
+W_KP = 55  # kappa, tau, beta at P
+W_KQ = 58  # kappa, tau, beta at Q
+W_JAC = 61  # Jacobi fields a, a', r, r' at Q
+W_E = 65  # unit vector of the straight segment that arrives at P (3)
+W_L = 68  # its length [m]
+W_CP = 69  # e.t, e.n, e.b at P (3)
+W_CQ = 72  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves
+W_LQ = 75  # length of the segment that leaves [m]
+W_EQ = 76  # its unit vector (3)
+W_Y = 79  # block elimination: solution for the right-hand side (4)
+W_X = 83  # block elimination: solution for the upper coupling (4 x 2)
+W_SAVE = 91  # P, t, s before a trial step (7)
+W_OLD = 98  # the saved solution from which the solve started (9)
+W_KMIN = 107  # smallest normal curvature along the geodesic [1/m]: a string lifts off where it is negative
+W_RMIN = 108  # smallest Jacobi field r along it, its start left out, over r's own scale: <= 0 behind a conjugate point
 ROW = 112  # 14 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`

@@ -18,7 +18,7 @@ S_MODE, S_P, S_ARC = lay.S_MODE, lay.S_P, lay.S_ARC
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
 W_BP, W_BQ, W_KP, W_KQ, W_JAC = lay.W_BP, lay.W_BQ, lay.W_KP, lay.W_KQ, lay.W_JAC
 W_E, W_L, W_CP, W_CQ, W_LQ, W_EQ = lay.W_E, lay.W_L, lay.W_CP, lay.W_CQ, lay.W_LQ, lay.W_EQ
-DIM = lay.DIM
+SIZE = lay.SIZE
 W_Y, W_X, W_SAVE = lay.W_Y, lay.W_X, lay.W_SAVE
 TOUCHED = lay.TOUCHED
 
@@ -46,7 +46,7 @@ def _leave(j, ex, ey, ez, size, node):
     node[j, W_EQ + 1] = ey
     node[j, W_EQ + 2] = ez
     node[j, W_LQ] = size
-    if size <= ON_SURFACE * node[j, DIM]:
+    if size <= ON_SURFACE * node[j, SIZE]:
         node[j, W_CQ] = 1.0
         node[j, W_CQ + 1] = 0.0
         node[j, W_CQ + 2] = 0.0
@@ -83,7 +83,7 @@ def evaluate(lo, hi, ends, node):
         node[k, W_E + 2] = dz
         node[k, W_L] = size
         along, normal, binormal = 1.0, 0.0, 0.0
-        if size > ON_SURFACE * node[k, DIM]:
+        if size > ON_SURFACE * node[k, SIZE]:
             along = _dot(node, k, W_E, k, W_TP)
             normal = _dot(node, k, W_E, k, W_NP)
             binormal = _dot(node, k, W_E, k, W_BP)
@@ -217,11 +217,11 @@ def _step_limit(lo, hi, node):
     worst = 1.0
     for k in range(lo, hi):
         if node[k, S_MODE] == TOUCHED:
-            inverse = 1.0 / node[k, DIM]
+            inverse = 1.0 / node[k, SIZE]
             worst = max(worst, abs(node[k, W_Y]) * inverse / MAX_SHIFT)
             worst = max(worst, abs(node[k, W_Y + 1]) * inverse / MAX_SHIFT)
             worst = max(worst, abs(node[k, W_Y + 2]) / MAX_TURN)
-            stretch = MAX_STRETCH * node[k, DIM] + 0.5 * abs(node[k, S_ARC])
+            stretch = MAX_STRETCH * node[k, SIZE] + 0.5 * abs(node[k, S_ARC])
             worst = max(worst, abs(node[k, W_Y + 3]) / stretch)
     return 1.0 / worst
 

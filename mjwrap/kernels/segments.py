@@ -41,9 +41,9 @@ def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
             px, py, pz = ix - ox, iy - oy, iz - oz
         ex, ey, ez = px - x, py - y, pz - z
         size = math.sqrt(ex * ex + ey * ey + ez * ez)
-        if k < hi and node[k, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[k, lay.DIM]:
+        if k < hi and node[k, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[k, lay.SIZE]:
             ex, ey, ez = node[k, lay.W_TP], node[k, lay.W_TP + 1], node[k, lay.W_TP + 2]
-        elif near >= lo and node[near, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[near, lay.DIM]:
+        elif near >= lo and node[near, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[near, lay.SIZE]:
             ex, ey, ez = node[near, lay.W_TQ], node[near, lay.W_TQ + 1], node[near, lay.W_TQ + 2]
         elif size > VANISHING:
             ex, ey, ez = ex / size, ey / size, ez / size

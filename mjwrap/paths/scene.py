@@ -85,6 +85,7 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
         node[k, layout.KIND] = obstacle.surface.kind
         dims = obstacle.surface.dims
         node[k, layout.DIM : layout.DIM + len(dims)] = dims
+        node[k, layout.SIZE] = obstacle.surface.size
         chain.set_rotation(node, k, *obstacle.quat)
         if obstacle.hint is not None:
             node[k, layout.HINT] = 1.0

@@ -13,6 +13,8 @@ _MESSAGES = {
     "NOT_MINIMAL": "the tangent path found is not a local minimum of length; a string would slip off it",
     "PENETRATING": "surfaces overlap where the path would touch them, so a part of it lies inside one",
     "NON_FINITE": "a pose or an end point is not finite",
+    "OUT_OF_RANGE": "the path touches a surface beyond the end of it, where it does not exist",
+    "NO_GEODESIC": "no geodesic leads round the surface that way; a string would slip off its end",
 }
 
 
@@ -25,6 +27,8 @@ class Status(enum.IntEnum):
     NOT_MINIMAL = layout.NOT_MINIMAL
     PENETRATING = layout.PENETRATING
     NON_FINITE = layout.NON_FINITE
+    OUT_OF_RANGE = layout.OUT_OF_RANGE
+    NO_GEODESIC = layout.NO_GEODESIC
 
     @property
     def message(self) -> str:
