@@ -76,8 +76,8 @@ W_Y = 79  # block elimination: solution for the right-hand side (4)
 W_X = 83  # block elimination: solution for the upper coupling (4 x 2)
 W_SAVE = 91  # P, t, s before a trial step (7)
 W_OLD = 98  # the saved solution from which the solve started (9)
-W_KMIN = 107  # smallest normal curvature along the geodesic [1/m]: a string lifts off where it is negative
-W_RMIN = 108  # smallest Jacobi field r along it, its start left out, over r's own scale: <= 0 behind a conjugate point
+W_KMIN = 107  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
+W_RMIN = 108  # smallest of r over the arc so far: <= 0 behind a conjugate point
 ROW = 112  # 14 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
