@@ -21,6 +21,7 @@ class Surface:
     """A smooth closed or unbounded surface in its own frame."""
 
     kind: ClassVar[int]
+    hollow: ClassVar[bool] = False  # whether a taut string may bridge a hollow of it and so touch it twice
 
     @property
     def dims(self) -> tuple[float, ...]:
@@ -160,6 +161,7 @@ class Torus(Surface):
     major_radius: float
     minor_radius: float
     kind: ClassVar[int] = layout.TORUS
+    hollow: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         major = _positive(self, "major_radius", self.major_radius)

@@ -6,23 +6,66 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.clearance import tube_angle, tube_crossing
+from mjwrap.kernels.shape import turn_into_frame
 
 KIND, DIM = lay.KIND, lay.DIM
 S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
-W_BP, W_BQ, W_JAC, W_L, W_LQ = lay.W_BP, lay.W_BQ, lay.W_JAC, lay.W_L, lay.W_LQ
+W_P, W_Q, W_BP, W_BQ, W_JAC = lay.W_P, lay.W_Q, lay.W_BP, lay.W_BQ, lay.W_JAC
+W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
 
 STABLE = -1e-9  # smallest admitted stiffness against a sideways shift, as a share of the segment's own
+LEAST_PRESSURE = -1e-9  # of the normal curvature times the surface's size
 SHORTEST = 1e-12  # segments count as at least this long here [m]
 
 
 @jit
+def branched(kind):
+    """Return whether the side on which a string passes a surface is topological, and S_SWEEP holds it."""
+    return kind == lay.CYLINDER or kind == lay.ELLIPTIC_CYLINDER or kind == lay.CONE or kind == lay.TORUS
+
+
+@jit
 def swept(k, node):
-    """Return the angle that the path of the last evaluation sweeps about cylinder k, with sign [rad]."""
-    inverse = 1.0 / node[k, DIM]
-    t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
-    rate = t_phi * inverse
-    free = math.atan(node[k, W_L] * abs(rate)) + math.atan(node[k, W_LQ] * abs(rate))
-    return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
+    """Return the angle that the path of the last evaluation sweeps, with sign [rad].
+
+    About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the middle of
+    a torus' tube.
+    """
+    if node[k, KIND] == lay.CYLINDER:
+        inverse = 1.0 / node[k, DIM]
+        t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
+        rate = t_phi * inverse
+        free = math.atan(node[k, W_L] * abs(rate)) + math.atan(node[k, W_LQ] * abs(rate))
+        return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
+    px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
+    size = -node[k, W_L]
+    ex, ey, ez = turn_into_frame(node, k, size * node[k, W_E], size * node[k, W_E + 1], size * node[k, W_E + 2])
+    ax, ay, az = px + ex, py + ey, pz + ez
+    dx, dy, dz = node[k, W_Q] - node[k, W_P], node[k, W_Q + 1] - node[k, W_P + 1], node[k, W_Q + 2] - node[k, W_P + 2]
+    dx, dy, dz = turn_into_frame(node, k, dx, dy, dz)
+    qx, qy, qz = px + dx, py + dy, pz + dz
+    size = node[k, W_LQ]
+    ex, ey, ez = turn_into_frame(
+        node, k, size * node[k, W_EQ], size * node[k, W_EQ + 1], size * node[k, W_EQ + 2]
+    )
+    bx, by, bz = qx + ex, qy + ey, qz + ez
+    if node[k, KIND] == lay.TORUS:
+        major = node[k, DIM]
+        turns = tube_crossing(major, ax, ay, az, px, py, pz) + tube_crossing(major, qx, qy, qz, bx, by, bz)
+        return (
+            tube_angle(major, bx, by, bz)
+            - tube_angle(major, ax, ay, az)
+            + 2.0 * math.pi * (turns + node[k, W_ANGLE])
+        )
+    if node[k, KIND] == lay.ELLIPTIC_CYLINDER:
+        ia, ib = 1.0 / node[k, DIM], 1.0 / node[k, DIM + 1]
+        ax, ay, px, py, qx, qy, bx, by = ia * ax, ib * ay, ia * px, ib * py, ia * qx, ib * qy, ia * bx, ib * by
+    return (
+        math.atan2(ax * py - ay * px, ax * px + ay * py)
+        + node[k, W_ANGLE]
+        + math.atan2(qx * by - qy * bx, qx * bx + qy * by)
+    )
 
 
 @jit
@@ -32,7 +75,8 @@ def minimal(lo, hi, node):
     At a tangent path the second variation lives in sideways shifts x b_P, y b_Q of the contact points alone:
     straight segments add |x b_P - y b_Q|^2 / L, geodesics (a x^2 - 2 x y + r' y^2) / r. Eliminated from the origin
     on, its pivots are a Riccati recursion in the stiffness c behind each point: the Jacobi field a + c r must stay
-    positive along every geodesic, and 1/L + c at every point that a straight segment leaves.
+    positive along every geodesic, and 1/L + c at every point that a straight segment leaves. Off the surface, the string
+    must not gain by lifting off: its normal curvature is nowhere negative.
     """
     last = -1
     c = 0.0
@@ -52,7 +96,7 @@ def minimal(lo, hi, node):
                 + node[last, W_BQ + 2] * node[k, W_BP + 2]
             )
             c = over - turn * turn * over * over / pivot
-        if node[k, KIND] == lay.SPHERE and node[k, S_ARC] >= math.pi * node[k, DIM]:
+        if node[k, lay.W_RMIN] <= 0.0 or node[k, lay.W_KMIN] < LEAST_PRESSURE / node[k, lay.SIZE]:
             return False
         field = node[k, W_JAC] + c * node[k, W_JAC + 2]
         if field <= 0.0:

@@ -89,6 +89,7 @@ def cone(k, node):
     qx, qy = m + s * along, s * around
     m_q = math.sqrt(qx * qx + qy * qy)
     turn = math.atan2(qy, qx) / sine
+    node[k, lay.W_ANGLE] = turn
     c, d = math.cos(turn), math.sin(turn)
     put_start(node, k, x, y, z, tx, ty, tz, cosine * cu, cosine * su, -away * sine)
     _curvature(node, k, W_KP, around, along, cosine / rho)

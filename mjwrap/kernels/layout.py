@@ -78,7 +78,10 @@ W_SAVE = 91  # P, t, s before a trial step (7)
 W_OLD = 98  # the saved solution from which the solve started (9)
 W_KMIN = 107  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
 W_RMIN = 108  # smallest of r over the arc so far: <= 0 behind a conjugate point
-ROW = 112  # 14 cache lines
+W_ANGLE = 109  # about the axis from P to Q [rad]; on a torus how often the hole is passed, downwards positive
+TWIN = 110  # 1 in the second row of a surface that a string may touch twice, 0 else
+W_LAST = 111  # the saved solution before a single wrap (9)
+ROW = 120  # 15 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
 I_LENGTH = 0

@@ -11,7 +11,6 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.direct import ON_SURFACE
 from mjwrap.kernels.geodesics import displace, geodesic
 
 S_MODE, S_P, S_ARC = lay.S_MODE, lay.S_P, lay.S_ARC
@@ -22,6 +21,7 @@ SIZE = lay.SIZE
 W_Y, W_X, W_SAVE = lay.W_Y, lay.W_X, lay.W_SAVE
 TOUCHED = lay.TOUCHED
 
+ON_SURFACE = 2e-9  # a straight segment shorter than this share of the radius ends on the surface, no tangent is shorter
 MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in radii
 MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in radii

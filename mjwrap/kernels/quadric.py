@@ -190,3 +190,23 @@ def quadric(k, node):
     put_end(node, k, x, y, z, tx, ty, tz, nx, ny, nz)
     put_curvature(node, k, lay.W_KQ, kappa, tau, beta)
     put_fields(node, k, a, da, r, dr, kappa, least)
+    if ic == 0.0:
+        node[k, lay.W_ANGLE] = _angle(node, k, x, y, tx, ty)
+
+
+@jit
+def _angle(node, k, x, y, tx, ty):
+    """Return the angle from P to Q about an elliptic cylinder's axis, in the image in which it is round [rad]."""
+    a, b = node[k, DIM], node[k, DIM + 1]
+    px, py, qx, qy = node[k, S_P] / a, node[k, S_P + 1] / b, x / a, y / b
+    angle = math.atan2(px * qy - py * qx, px * qx + py * qy)
+    way = node[k, S_ARC] * math.sqrt(tx * tx + ty * ty)  # seen along the axis
+    if abs(way) < 2.0 * min(a, b):  # less than half a turn
+        return angle
+    turn = math.copysign(1.0, (qx * ty / b - qy * tx / a) * way)
+    if angle * turn < 0.0:
+        angle += turn * 2.0 * math.pi
+    h = ((a - b) / (a + b)) ** 2  # circumference by Ramanujan's formula
+    round_it = math.pi * (a + b) * (1.0 + 3.0 * h / (10.0 + math.sqrt(4.0 - 3.0 * h)))
+    share = abs(way) / round_it - abs(angle) / (2.0 * math.pi)
+    return angle + turn * 2.0 * math.pi * max(math.floor(share + 0.5), 0.0)

@@ -8,8 +8,10 @@ import numpy as np
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.direct import TWO_PI, wrap
+from mjwrap.kernels.certify import branched
+from mjwrap.kernels.direct import wrap
 from mjwrap.kernels.geodesics import geodesic
+from mjwrap.kernels.ruled import TWO_PI
 
 KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
@@ -46,12 +48,15 @@ def _following(k, hi, ends, node):
 
 @jit
 def relax(lo, hi, ends, node, passes):
-    """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`."""
-    for _ in range(passes):
+    """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`.
+
+    Lost contacts are searched for in the first pass only.
+    """
+    for i in range(passes):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
             qx, qy, qz = _following(k, hi, ends, node)
-            wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz)
+            wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i == 0)
             if node[k, S_MODE] == TOUCHED:
                 geodesic(k, node, ends[0], ends[1], ends[2])
                 x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
@@ -82,7 +87,7 @@ def shorten(lo, hi, ends, node, passes):
     saved = np.empty((hi - lo, lay.STATE))
     best = path_length(lo, hi, ends, node)
     for k in range(lo, hi):
-        if node[k, KIND] != lay.CYLINDER or node[k, HINT] != 0.0 or node[k, S_MODE] != TOUCHED:
+        if not branched(node[k, KIND]) or node[k, HINT] != 0.0 or node[k, S_MODE] != TOUCHED:
             continue
         if abs(node[k, S_SWEEP]) < 0.5 * math.pi:
             continue

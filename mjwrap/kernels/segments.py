@@ -11,7 +11,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.direct import ON_SURFACE
+from mjwrap.kernels.newton import ON_SURFACE
 
 G_NEAR = 0
 G_FAR = 1

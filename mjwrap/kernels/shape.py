@@ -13,7 +13,23 @@ from mjwrap.kernels._jit import jit
 from mjwrap.kernels.closed_forms import capsule_normal
 from mjwrap.kernels.quadric import inverse_squares, onto
 
-KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
+KIND, DIM, SIZE, POS, ROT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.ROT
+
+
+@jit
+def into_frame(node, k, x, y, z):
+    """Return the world point (x, y, z) in the frame of obstacle k."""
+    return turn_into_frame(node, k, x - node[k, POS], y - node[k, POS + 1], z - node[k, POS + 2])
+
+
+@jit
+def turn_into_frame(node, k, x, y, z):
+    """Return the world vector (x, y, z) in the frame of obstacle k."""
+    return (
+        node[k, ROT] * x + node[k, ROT + 3] * y + node[k, ROT + 6] * z,
+        node[k, ROT + 1] * x + node[k, ROT + 4] * y + node[k, ROT + 7] * z,
+        node[k, ROT + 2] * x + node[k, ROT + 5] * y + node[k, ROT + 8] * z,
+    )
 
 
 # ---------------------------------------------------------------------------------------- projection

@@ -2,24 +2,27 @@
 
 Which obstacles are touched is part of the answer (method section 4): Newton's method runs on the touched ones, those
 whose arc would be negative are dropped, those that a straight segment enters are taken in, until nothing changes.
-Where that fails, and at a cold start, obstacle after obstacle is wrapped in closed form between its neighbours'
+Where that fails, and at a cold start, obstacle after obstacle is wrapped by itself between its neighbours'
 contact points (each such wrap shortens the path), and Newton's method polishes the result.
 """
 
 from __future__ import annotations
 
+import math
+
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.certify import minimal, swept
-from mjwrap.kernels.direct import A_INSIDE, B_INSIDE, follow, holds, wrap
+from mjwrap.kernels.certify import minimal
+from mjwrap.kernels.direct import holds
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.relax import path_length, relax, shorten
+from mjwrap.kernels.shape import into_frame, project
+from mjwrap.kernels.touch import drop, follow_branch, in_range, take_in
 
-KIND = lay.KIND
-S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
-W_P, W_Q, W_OLD = lay.W_P, lay.W_Q, lay.W_OLD
-COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
+DIM, POS, ROT = lay.DIM, lay.POS, lay.ROT
+S_MODE, W_OLD = lay.S_MODE, lay.W_OLD
+COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 MAX_NEWTON = 25
 MAX_ROUNDS = 50  # changes of the set of touched obstacles, repairs included
@@ -55,73 +58,20 @@ def _restore(lo, hi, ends, node):
 
 
 @jit
-def _follow_branch(lo, hi, node):
-    """Note how far the path sweeps about every cylinder; return False where that is not the way it went before."""
-    same = True
+def _outside(lo, hi, ends, node, column):
+    """Return whether an end of the span lies inside an obstacle, and the end moved onto that obstacle's surface."""
+    x, y, z = ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
     for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED and node[k, KIND] == lay.CYLINDER:
-            angle = swept(k, node)
-            if abs(angle - follow(angle, node[k, S_SWEEP])) > 1.0:
-                same = False
-            else:
-                node[k, S_SWEEP] = angle
-    return same
-
-
-@jit
-def _drop(lo, hi, node):
-    """Release the obstacles whose arc is negative; return how many."""
-    dropped = 0
-    for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED and node[k, S_ARC] < 0.0:
-            node[k, S_MODE] = FREE
-            node[k, S_ARC] = 0.0
-            dropped += 1
-    return dropped
-
-
-@jit
-def _take_in(lo, hi, ends, node):
-    """Take in the obstacles that a straight segment enters; return how many, and the status that forbids a path."""
-    x, y, z = ends[3], ends[4], ends[5]
-    added = 0
-    status = lay.CONVERGED
-    before = -1
-    for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED:
-            x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
-            before = k
-            continue
-        qx, qy, qz = ends[6], ends[7], ends[8]
-        after = -1
-        for j in range(k + 1, hi):
-            if node[j, S_MODE] == TOUCHED:
-                qx, qy, qz = node[j, W_P], node[j, W_P + 1], node[j, W_P + 2]
-                after = j
-                break
-        held = wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz)
-        if held != 0:
-            if (held & A_INSIDE and before < 0) or (held & B_INSIDE and after < 0):
-                status = lay.ENDPOINT_INSIDE
-            elif status == lay.CONVERGED:
-                status = lay.PENETRATING
-        if node[k, S_MODE] == TOUCHED:
-            geodesic(k, node, ends[0], ends[1], ends[2])
-            x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
-            before = k
-            added += 1
-    return added, status
-
-
-@jit
-def _end_inside(lo, hi, ends, node):
-    """Return whether A or B lies inside an obstacle of the span."""
-    for k in range(lo, hi):
-        if holds(k, node, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5]):
-            return True
-        if holds(k, node, ends[0] + ends[6], ends[1] + ends[7], ends[2] + ends[8]):
-            return True
-    return False
+        if holds(k, node, x, y, z):
+            px, py, pz = into_frame(node, k, x, y, z)
+            px, py, pz, _, _, _ = project(node, k, px, py, pz)
+            return (
+                True,
+                node[k, POS] + node[k, ROT] * px + node[k, ROT + 1] * py + node[k, ROT + 2] * pz - ends[0],
+                node[k, POS + 1] + node[k, ROT + 3] * px + node[k, ROT + 4] * py + node[k, ROT + 5] * pz - ends[1],
+                node[k, POS + 2] + node[k, ROT + 6] * px + node[k, ROT + 7] * py + node[k, ROT + 8] * pz - ends[2],
+            )  # fmt: skip
+    return False, ends[column], ends[column + 1], ends[column + 2]
 
 
 @jit
@@ -130,15 +80,29 @@ def solve_span(lo, hi, ends, node, tol, direct):
 
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     leaves the new one in its place. With `direct` a single obstacle is wrapped in closed form whatever is saved but
-    its branch.
+    its branch. Where an end lies inside a surface, the length is that of the path from the surface point next to it.
     """
+    status, total, error, iterations, evaluations = _solve(lo, hi, ends, node, tol, direct)
+    if status == lay.ENDPOINT_INSIDE:
+        _, ax, ay, az = _outside(lo, hi, ends, node, 3)
+        _, bx, by, bz = _outside(lo, hi, ends, node, 6)
+        _restore(lo, hi, ends, node)
+        ends = (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
+        _, total, _, i, e = _solve(lo, hi, ends, node, tol, direct)
+        iterations += i
+        evaluations += e
+    return status, total, error, iterations, evaluations
+
+
+@jit
+def _solve(lo, hi, ends, node, tol, direct):
+    """Do what `solve_span` says for ends that lie outside of every surface."""
     iterations, evaluations, repairs = 0, 0, 0
     error = 0.0
     status = lay.CONVERGED
     cold = _any(lo, hi, node, COLD)
     if cold or (direct and hi - lo == 1):
-        passes = COLD_PASSES if hi - lo > 1 else 1
-        evaluations += relax(lo, hi, ends, node, passes)
+        evaluations += relax(lo, hi, ends, node, COLD_PASSES if hi - lo > 1 else 1)
         if cold and hi - lo > 1:
             evaluations += shorten(lo, hi, ends, node, COLD_PASSES)
     _remember(lo, hi, node)
@@ -151,30 +115,36 @@ def solve_span(lo, hi, ends, node, tol, direct):
             error, i, e = newton(lo, hi, ends, node, tol, MAX_NEWTON)
             iterations += i
             evaluations += e
-            good = error <= tol and _follow_branch(lo, hi, node)
+            good = error <= tol and follow_branch(lo, hi, node)
         if good and minimal(lo, hi, node):
-            dropped = _drop(lo, hi, node)
-            added, status = _take_in(lo, hi, ends, node)
+            dropped = drop(lo, hi, node)
+            added, status = take_in(lo, hi, ends, node)
             if dropped + added == 0:
                 settled = True
                 break
             changes += 1
             if changes <= hi - lo + CALM:
                 continue
-        if repairs == MAX_REPAIRS:
+        if repairs == MAX_REPAIRS or (hi - lo == 1 and repairs == 1):
             status = lay.NOT_MINIMAL if good and changes == 0 else lay.NOT_CONVERGED
             break
         if repairs == 0:
             _restore(lo, hi, ends, node)
-        passes = REPAIR_PASSES + repairs if hi - lo > 1 else 1
-        evaluations += relax(lo, hi, ends, node, passes << 2 * repairs)
+        passes = (REPAIR_PASSES + repairs) << 2 * repairs if hi - lo > 1 else 1
+        evaluations += relax(lo, hi, ends, node, passes)
         repairs += 1
         changes = 0
-    if not settled and status != lay.NOT_MINIMAL:
-        _, status = _take_in(lo, hi, ends, node)
-        if _end_inside(lo, hi, ends, node):
+    if not settled:
+        inside = _outside(lo, hi, ends, node, 3)[0] or _outside(lo, hi, ends, node, 6)[0]
+        if inside:
             status = lay.ENDPOINT_INSIDE
-        elif status == lay.CONVERGED:
-            status = lay.NOT_CONVERGED
+        elif status != lay.NOT_MINIMAL:
+            _, status = take_in(lo, hi, ends, node)
+            if status == lay.CONVERGED:
+                status = lay.NOT_CONVERGED
+    elif status == lay.CONVERGED and not in_range(lo, hi, ends, node):
+        status = lay.OUT_OF_RANGE
     total = path_length(lo, hi, ends, node)
+    if not math.isfinite(error):
+        status = lay.NOT_CONVERGED
     return status, total, error, iterations, evaluations

@@ -118,6 +118,7 @@ def torus(k, node):
     a, da, r, dr = 1.0, 0.0, 0.0, 1.0
     least, straightest = 1.0, node[k, lay.W_KP]
     longest = 1e300
+    turns = 0.0
     for _ in range(MAX_STEPS):
         if left == 0.0:
             break
@@ -134,6 +135,8 @@ def torus(k, node):
         if not doubt <= TOLERANCE:
             longest = abs(h) * min(max((0.1 * TOLERANCE / doubt) ** SHRINK, 0.2), 0.9)
             continue
+        if (z >= 0.0) != (z1 >= 0.0) and rho + p1 < 2.0 * major:
+            turns += 1.0 if (z >= 0.0) == (left > 0.0) else -1.0
         rho, z, dp, dz, a, da, r, dr = p1, z1, dp1, dz1, a1, da1, r1, dr1
         angle += part
         gone += h
@@ -158,6 +161,7 @@ def torus(k, node):
         -around * su - along * sv * cu, around * cu - along * sv * su, along * cv, cv * cu, cv * su, sv,
     )  # fmt: skip
     _put_curvature(node, k, lay.W_KQ, around, along, cv, ir, rho)
+    node[k, lay.W_ANGLE] = turns
     put_fields(node, k, a, da, r, dr, straightest, least)
 
 

@@ -71,25 +71,39 @@ class ViaPoint:
         object.__setattr__(self, "pos", vector(self.pos, 3, "ViaPoint: pos"))
 
 
+def owners(obstacles: Sequence[Obstacle | ViaPoint]) -> NDArray[np.int64]:
+    """Return for every row of the kernels which obstacle it belongs to: a surface with hollows has two rows."""
+    found: list[int] = []
+    for k, obstacle in enumerate(obstacles):
+        twice = isinstance(obstacle, Obstacle) and obstacle.surface.hollow
+        found += [k, k] if twice else [k]
+    return np.array(found, dtype=np.int64)
+
+
 def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
-    """Return the kernels' rows for a list of obstacles, cold."""
-    node = np.zeros((len(obstacles), layout.ROW))
-    node[:, layout.S_MODE] = layout.COLD
+    """Return the kernels' rows for a list of obstacles, cold; two for a surface that a string may touch twice."""
     for k, obstacle in enumerate(obstacles):
         if not isinstance(obstacle, Obstacle | ViaPoint):
             raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")
-        node[k, layout.POS : layout.POS + 3] = obstacle.pos
+    owner = owners(obstacles)
+    node = np.zeros((len(owner), layout.ROW))
+    node[:, layout.S_MODE] = layout.COLD
+    for row, k in enumerate(owner):
+        obstacle = obstacles[k]
+        node[row, layout.POS : layout.POS + 3] = obstacle.pos
         if isinstance(obstacle, ViaPoint):
-            node[k, layout.KIND] = layout.VIA
+            node[row, layout.KIND] = layout.VIA
             continue
-        node[k, layout.KIND] = obstacle.surface.kind
+        node[row, layout.KIND] = obstacle.surface.kind
         dims = obstacle.surface.dims
-        node[k, layout.DIM : layout.DIM + len(dims)] = dims
-        node[k, layout.SIZE] = obstacle.surface.size
-        chain.set_rotation(node, k, *obstacle.quat)
-        if obstacle.hint is not None:
-            node[k, layout.HINT] = 1.0
-            node[k, layout.HINT + 1 : layout.HINT + 4] = obstacle.hint
+        node[row, layout.DIM : layout.DIM + len(dims)] = dims
+        node[row, layout.SIZE] = obstacle.surface.size
+        chain.set_rotation(node, row, *obstacle.quat)
+        if row > 0 and owner[row - 1] == k:
+            node[row, layout.TWIN] = 1.0
+        elif obstacle.hint is not None:
+            node[row, layout.HINT] = 1.0
+            node[row, layout.HINT + 1 : layout.HINT + 4] = obstacle.hint
     return node
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout, polyline, segments
 from mjwrap.paths.scene import SAVED, Array, Point, vector
 from mjwrap.paths.status import Status
+
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -18,13 +20,15 @@ class Contact:
     """Where a path touches one obstacle.
 
     active: whether it does; P, Q (3,): first and last contact point, world [m] (None where not active);
-    arc_length: of the geodesic from P to Q [m]. A via point is always active, with P = Q.
+    arc_length: of the geodesic from P to Q [m]; second: where the string touches the same surface again, behind a hollow
+    that it bridges (through the air over a torus' hole), else None. A via point is always active, with P = Q.
     """
 
     active: bool
     P: Array | None
     Q: Array | None
     arc_length: float
+    second: Contact | None = None
 
 
 class PathSolution:
@@ -35,7 +39,8 @@ class PathSolution:
     `Contact` per obstacle. Where the path was not found the length is that of the last iterate, never NaN.
     """
 
-    def __init__(self, origin: Point, insertion: Point, node: Array, saved: Array) -> None:
+    def __init__(self, origin: Point, insertion: Point, node: Array, owner: Ints, saved: Array) -> None:
+        self._owner = owner  # (rows,) which obstacle each row of `node` belongs to
         self._origin, self._insertion, self._node, self._saved = origin, insertion, node, saved
         self._ends = (0, len(node), *origin, *insertion)
         self.length = 0.0
@@ -57,10 +62,17 @@ class PathSolution:
         if self.status == Status.ENDPOINT_INSIDE:
             self._saved[:, 0] = layout.COLD  # where a string comes out again is anybody's guess
         self._count = segments.list_segments(*self._ends, self._node, self._segments, 0)
-        self.contacts = [self._contact(k) for k in range(len(self._node))]
+        self.contacts = []
+        for row, k in enumerate(self._owner):
+            contact = self._contact(row)
+            if k == len(self.contacts):
+                self.contacts.append(contact)
+            elif contact.active:
+                first = self.contacts[k]
+                self.contacts[k] = replace(first, second=contact) if first.active else contact
 
-    def _contact(self, k: int) -> Contact:
-        row = self._node[k]
+    def _contact(self, index: int) -> Contact:
+        row = self._node[index]
         if row[layout.KIND] == layout.VIA:
             here = row[layout.POS : layout.POS + 3].copy()
             return Contact(True, here, here.copy(), 0.0)
@@ -103,8 +115,8 @@ class PathSolution:
         origin_velocity, insertion_velocity (3,) [m/s]; twists (n, 6), one per obstacle or via point: linear velocity of
         the pose's origin [m/s], then angular velocity [rad/s], world frame; None where nothing moves.
         """
-        n = len(self._node)
-        pos, twist = np.zeros((n + 2, 3)), np.zeros((n + 2, 6))
+        rows, n = len(self._node), len(self.contacts)
+        pos, twist = np.zeros((rows + 2, 3)), np.zeros((rows + 2, 6))
         pos[0], pos[1:-1], pos[-1] = self._origin, self._node[:, layout.POS : layout.POS + 3], self._insertion
         twist[0, :3] = vector(origin_velocity, 3, "origin_velocity")
         twist[-1, :3] = vector(insertion_velocity, 3, "insertion_velocity")
@@ -113,7 +125,7 @@ class PathSolution:
             if given.size or n:
                 if given.shape != (n, 6):
                     raise GeometryError(f"twists must have shape ({n}, 6), not {given.shape}")
-                twist[1:-1] = given
+                twist[1:-1] = given[self._owner]
         if not np.isfinite(twist).all():
             raise GeometryError("twists must be finite")
         return float(segments.lengthening_rate(self._count, self._segments, pos, twist))
@@ -126,6 +138,9 @@ class PathSolution:
         """
         if not np.isfinite(tension):
             raise GeometryError(f"tension must be finite [N], not {tension!r}")
-        wrench = np.zeros((len(self._node) + 2, 6))
-        segments.add_wrenches(self._count, self._segments, float(tension), wrench)
+        by_row = np.zeros((len(self._node) + 2, 6))
+        segments.add_wrenches(self._count, self._segments, float(tension), by_row)
+        wrench = np.zeros((len(self.contacts) + 2, 6))
+        wrench[0], wrench[-1] = by_row[0], by_row[-1]
+        np.add.at(wrench, self._owner + 1, by_row[1:-1])
         return wrench

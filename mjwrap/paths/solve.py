@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import chain, layout
-from mjwrap.paths.scene import SAVED, Array, Obstacle, Point, ViaPoint, pack, point
+from mjwrap.paths.scene import SAVED, Array, Obstacle, Point, ViaPoint, owners, pack, point
 from mjwrap.paths.solution import PathSolution
 
 
@@ -45,10 +45,10 @@ def solve_path(
     if not (np.isfinite(tol) and tol > 0.0):
         raise GeometryError(f"tol must be finite and positive, not {tol!r}")
     here, there = point(origin, "origin"), point(insertion, "insertion")
-    node = pack(obstacles)
+    node, owner = pack(obstacles), owners(obstacles)
     _start(start, node)
     before = node[:, SAVED].copy()
-    solution = PathSolution(here, there, node, before)
+    solution = PathSolution(here, there, node, owner, before)
     info = np.zeros((1, layout.INFO))
     if method == "newton":
         if options:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import chain, layout
-from mjwrap.paths.scene import Array, Obstacle, pack
+from mjwrap.paths.scene import Array, Obstacle, owners, pack
 from mjwrap.paths.status import Status
 
 
@@ -64,7 +64,7 @@ def solve_sweep(
     if not (np.isfinite(tol) and tol > 0.0):
         raise GeometryError(f"tol must be finite and positive, not {tol!r}")
     n = len(obstacles)
-    node = pack(obstacles)
+    node, owner = pack(obstacles), owners(obstacles)
     shape = np.shape(pos)
     if len(shape) != 3 or shape[1:] != (n, 3):
         raise GeometryError(f"pos must have shape (T, {n}, 3), not {shape}")
@@ -77,8 +77,8 @@ def solve_sweep(
     chain.solve_motion(
         _motion(origin, (poses, 3), "origin"),
         _motion(insertion, (poses, 3), "insertion"),
-        where,
-        turned,
+        where[:, owner],
+        turned[:, owner],
         node,
         bool(warm),
         float(tol),
