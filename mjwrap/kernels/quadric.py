@@ -73,10 +73,10 @@ def _substep(v, first, last, k, cx, cy, cz, d):
 
 
 @jit
-def _step(h, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic):
+def _step(h, rate, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic):
     """Take one step of length h in g, its rate u, and both fields; c, d: constants of the forces.
 
-    Returns the error estimate and the new state.
+    rate: 1 over the local length scale. Returns the error estimate, in that scale, and the new state.
     """
     v = carray(stack(), (ROWS, LANES))
     hh = h * h
@@ -111,10 +111,10 @@ def _step(h, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic):
         v[8, i] -= size * (d * v[3, i])
         v[9, i] -= size * (d * v[4, i])
     over = 1.0 / h
-    doubt = max(abs(combine(v, 0, DOUBT)) / ia, abs(combine(v, 1, DOUBT)) / ib) * abs(over)
+    doubt = max(abs(combine(v, 0, DOUBT)) / ia, abs(combine(v, 1, DOUBT)) / ib)
     if ic != 0.0:
-        doubt = max(doubt, abs(combine(v, 2, DOUBT) / (ic * h)))
-    doubt = max(doubt, max(abs(combine(v, 3, DOUBT)), abs(combine(v, 4, DOUBT) * over)))
+        doubt = max(doubt, abs(combine(v, 2, DOUBT)) / ic)
+    doubt = max(max(doubt, abs(combine(v, 4, DOUBT))) * rate, abs(combine(v, 3, DOUBT)))
     return (
         doubt, combine(v, 0, WEIGHT), combine(v, 1, WEIGHT), combine(v, 2, WEIGHT),
         combine(v, 5, RATE) * over, combine(v, 6, RATE) * over, combine(v, 7, RATE) * over,
@@ -169,7 +169,7 @@ def quadric(k, node):
         else:
             h = left / math.ceil(abs(left) / h)
         doubt, px, py, pz, vx, vy, vz, f, df, g, dg = _step(
-            h, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic
+            h, rate, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic
         )
         if not doubt <= TOLERANCE:
             longest = abs(h) * min(max((0.1 * TOLERANCE / doubt) ** SHRINK, 0.2), 0.9)

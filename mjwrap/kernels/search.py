@@ -259,7 +259,7 @@ def wrap_searched(k, ends, node, search):
     inside = (A_INSIDE if in_a else 0) + (B_INSIDE if in_b else 0)
     ends = (ends[0], ends[1], ends[2], qx, qy, qz, rx, ry, rz)
     mode, before = node[k, S_MODE], node[k, S_SWEEP]
-    winds = node[k, KIND] == lay.TORUS
+    winds = node[k, KIND] == lay.TORUS and node[k, lay.TWIN] == 0.0
     branch = winds and mode != COLD
     if mode == TOUCHED:
         for i in range(lay.STATE):
@@ -308,7 +308,7 @@ def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, br
     else:
         wx, wy, wz = wx / length, wy / length, wz / length
     vx, vy, vz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    winds = node[k, KIND] == lay.TORUS
+    winds = node[k, KIND] == lay.TORUS and node[k, lay.TWIN] == 0.0
     found, best = False, 0.0
     guessed = False
     memory = carray(stack(), (80,))

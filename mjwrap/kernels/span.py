@@ -18,7 +18,7 @@ from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.relax import path_length, relax, shorten
 from mjwrap.kernels.shape import into_frame, project
-from mjwrap.kernels.touch import drop, follow_branch, in_range, take_in
+from mjwrap.kernels.touch import drop, follow_branch, in_range, split, take_in
 
 DIM, POS, ROT = lay.DIM, lay.POS, lay.ROT
 S_MODE, W_OLD = lay.S_MODE, lay.W_OLD
@@ -122,6 +122,10 @@ def _solve(lo, hi, ends, node, tol, direct):
             if dropped + added == 0:
                 settled = True
                 break
+            changes += 1
+            if changes <= hi - lo + CALM:
+                continue
+        elif good and split(lo, hi, ends, node) > 0:
             changes += 1
             if changes <= hi - lo + CALM:
                 continue

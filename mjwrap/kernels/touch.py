@@ -16,17 +16,29 @@ S_MODE, S_SWEEP, S_P, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_ARC
 W_P, W_Q = lay.W_P, lay.W_Q
 FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
+PIECES = 24  # of a geodesic, to find where it runs through a hollow
 DEPTH = -1e-9  # a segment that dips less below the surface that it leaves or meets, in its size, only touches it
 
 
 @jit
+def _has_twin(k, hi, node):
+    """Return whether the next row is the same surface once more."""
+    return k + 1 < hi and node[k + 1, lay.TWIN] != 0.0
+
+
+@jit
 def follow_branch(lo, hi, node):
-    """Note how far the path sweeps about every surface; return False where that is not the way it went before."""
+    """Note how far the path sweeps about every surface; return False where that is not the way it went before.
+
+    Of the two contacts of a bridged hollow only their sum is topological, and Newton's method keeps them.
+    """
     same = True
     for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED and branched(node[k, KIND]):
+        if node[k, S_MODE] == TOUCHED and branched(node[k, KIND]) and node[k, lay.TWIN] == 0.0:
             angle = swept(k, node)
-            if abs(angle - follow(angle, node[k, S_SWEEP])) > 1.0:
+            if _has_twin(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
+                node[k, S_SWEEP] = angle
+            elif abs(angle - follow(angle, node[k, S_SWEEP])) > 1.0:
                 same = False
             else:
                 node[k, S_SWEEP] = angle
@@ -49,12 +61,6 @@ def drop(lo, hi, node):
 def hollow(kind):
     """Return whether a straight segment that is tangent to the surface may enter it elsewhere."""
     return kind == lay.TORUS or kind == lay.CUSTOM
-
-
-@jit
-def _has_twin(k, hi, node):
-    """Return whether the next row is the same surface once more."""
-    return k + 1 < hi and node[k + 1, lay.TWIN] != 0.0
 
 
 @jit
@@ -83,6 +89,50 @@ def _hand_over(k, node):
         node[k + 1, S_MODE + i] = node[k, S_MODE + i]
     node[k, S_MODE] = FREE
     node[k, S_ARC] = 0.0
+
+
+@jit
+def split(lo, hi, ends, node):
+    """Where a geodesic runs through a hollow that the string would bridge, give its far part to the surface's second row.
+
+    Returns how many contacts were split.
+    """
+    count = 0
+    for k in range(lo, hi - 1):
+        if node[k, S_MODE] != TOUCHED or node[k, lay.W_KMIN] >= 0.0:
+            continue
+        if not _has_twin(k, hi, node) or node[k + 1, S_MODE] == TOUCHED:
+            continue
+        arc = node[k, S_ARC]
+        first, last = -1, -1
+        for i in range(PIECES + 1):
+            node[k, S_ARC] = arc * i / PIECES
+            geodesic(k, node, ends[0], ends[1], ends[2])
+            if node[k, lay.W_KQ] < 0.0:
+                first = i if first < 0 else first
+                last = i
+        if first <= 0 or last >= PIECES:  # it starts or ends in the hollow: no string does
+            node[k, S_ARC] = arc
+            geodesic(k, node, ends[0], ends[1], ends[2])
+            continue
+        node[k, S_ARC] = arc * (last + 1) / PIECES
+        geodesic(k, node, ends[0], ends[1], ends[2])
+        x, y, z = node[k, W_Q] - node[k, W_P], node[k, W_Q + 1] - node[k, W_P + 1], node[k, W_Q + 2] - node[k, W_P + 2]
+        x, y, z = turn_into_frame(node, k, x, y, z)
+        tx, ty, tz = turn_into_frame(node, k, node[k, lay.W_TQ], node[k, lay.W_TQ + 1], node[k, lay.W_TQ + 2])
+        node[k + 1, S_MODE] = TOUCHED
+        node[k + 1, S_P] = node[k, S_P] + x
+        node[k + 1, S_P + 1] = node[k, S_P + 1] + y
+        node[k + 1, S_P + 2] = node[k, S_P + 2] + z
+        node[k + 1, lay.S_T] = tx
+        node[k + 1, lay.S_T + 1] = ty
+        node[k + 1, lay.S_T + 2] = tz
+        node[k + 1, S_ARC] = arc * (PIECES - last - 1) / PIECES
+        node[k, S_ARC] = arc * (first - 1) / PIECES
+        geodesic(k, node, ends[0], ends[1], ends[2])
+        geodesic(k + 1, node, ends[0], ends[1], ends[2])
+        count += 1
+    return count
 
 
 @jit
