@@ -1,98 +1,368 @@
-"""Cold starts over random rows of cylinders and spheres: how many converge, and is every claim true?
+"""Cold starts over seeded random scenes: how many converge, is every claim true, is a path without hints the shortest?
 
-Scenes at muscle scale (spacing 6 to 12 cm, radii 1 to 4.5 cm, axes tilted by about 0.4 rad, nothing overlapping),
-with and without random hints. Each solution that is called converged is judged again by the independent certificate
-of `tests/scenes.py`, from its contact points alone. Cases that do not converge can be saved and replayed.
+Scenes at muscle scale of every surface alone and of rows of 3, 5, 16 and 64 (`random_scenes.py`), each solved with good hints,
+with random ones and with none. Every converged answer is judged again, from its contact points alone, by `tests/certificate.py`. Answers
+without hints are compared with every other path known for the scene: the one that it was made for, the certified answers with
+hints, and, for the first --multistart scenes of a class, the shortest that an independent search finds (`multistart.py`).
+Whatever does not converge, is refuted or is longer can be saved and replayed. The exit status is 1 if a claim is refuted.
 """
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # matrices here are small: more threads only fight each other
+
 import argparse
 import collections
 import json
+import math
+import multiprocessing
 import sys
 import time
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
 import mjwrap as mw
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from scenes import check_path, random_scene
+from cases import describe, plain, replay
+from certificate import Case, findings
+from multistart import SHORTER, shortest
+from random_scenes import CLASSES, Maker, Scene
 
-ROWS = {
-    "cylinder": "c",
-    "sphere": "s",
-    "3 mixed": "csc",
-    "5 cylinders": "ccccc",
-    "5 mixed": "csccs",
-    "16 mixed": "cscc" * 4,
-}
-
-
-def describe(origin: np.ndarray, insertion: np.ndarray, row: list[mw.Obstacle]) -> dict:
-    """Return a scene as plain numbers, to be saved and replayed."""
-    return {
-        "origin": list(origin),
-        "insertion": list(insertion),
-        "obstacles": [
-            [type(o.surface).__name__, float(o.surface.dims[0]), list(o.pos), list(o.quat), o.hint]
-            for o in row
-        ],
-    }
+HINTS = ("good", "random", "none")
+REFUSALS = ("OUT_OF_RANGE", "NO_GEODESIC")  # no path of that kind exists, says the solver
+CHUNK = {1: 100, 3: 100, 5: 100, 16: 40, 64: 20}  # scenes made from one pool
+PEERS = (
+    "CableSpan (C++, measured once on the same machine): of cold starts on mixed scenes 8 to 10 % do not converge, and nothing\n"
+    "says so; folded paths, a longest path over a sphere (0.33915 m for a minimum of 0.30562 m) and a path of 28,792 m round\n"
+    "a cylinder of 0.036 m count as converged; end points inside a surface throw."
+)
 
 
-def main() -> int:
+@dataclass
+class Tally:
+    """What happened in the scenes of one class with one kind of hints."""
+
+    scenes: int = 0
+    status: collections.Counter[str] = field(default_factory=collections.Counter)
+    exceptions: int = 0
+    not_finite: int = 0
+    refuted: int = 0
+    folded: int = 0
+    penetrating: int = 0
+    compared: int = 0
+    searched: int = 0
+    longer: int = 0
+    refused_wrongly: int = 0
+    evaluations: list[int] = field(default_factory=list)
+    microseconds: list[float] = field(default_factory=list)
+
+    def add(self, other: Tally) -> None:
+        """Add the counts of another tally of the same class."""
+        for name, value in vars(other).items():
+            setattr(self, name, getattr(self, name) + value)
+
+    @property
+    def lost(self) -> int:
+        """Scenes that ended without a path, those left out in which the solver says that there is none."""
+        found = self.status["CONVERGED"] + sum(self.status[name] for name in REFUSALS)
+        return self.scenes - found
+
+    @property
+    def wrong(self) -> int:
+        """Claims that are not true."""
+        return self.refuted + self.exceptions + self.not_finite
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what is printed and saved."""
+        return {
+            "scenes": self.scenes,
+            **{
+                name: getattr(self, name)
+                for name in ("exceptions", "not_finite", "refuted", "folded", "penetrating")
+            },
+            "status": dict(self.status),
+            "not_converged": self.lost,
+            "refused": sum(self.status[name] for name in REFUSALS),
+            **{name: getattr(self, name) for name in ("refused_wrongly", "longer", "compared", "searched")},
+            "evaluations_median": float(np.median(self.evaluations)) if self.evaluations else math.nan,
+            "evaluations_most": max(self.evaluations, default=0),
+            "us_median": float(np.median(self.microseconds)) if self.microseconds else math.nan,
+            "us_p95": float(np.percentile(self.microseconds, 95)) if self.microseconds else math.nan,
+        }
+
+
+@dataclass
+class Answer:
+    """What the solver said about one scene with one kind of hints."""
+
+    obstacles: list[mw.Obstacle]
+    sol: mw.PathSolution | None = None
+    case: Case | None = None
+    reason: str = ""  # empty where the path converged and nothing speaks against it
+
+
+def _solve(scene: Scene, obstacles: list[mw.Obstacle], tally: Tally) -> Answer:
+    """Solve one scene and count how that ends."""
+    tally.scenes += 1
+    answer = Answer(obstacles)
+    started = time.perf_counter()
+    try:
+        sol = mw.solve_path(scene.origin, scene.insertion, obstacles)
+    except Exception as error:
+        tally.exceptions += 1
+        answer.reason = f"exception: {error!r}"
+        return answer
+    tally.microseconds.append(1e6 * (time.perf_counter() - started))
+    tally.evaluations.append(sol.evaluations)
+    tally.status[sol.status.name] += 1
+    answer.sol = sol
+    values = [sol.length, sol.tangency_error, *sol.points().ravel(), *sol.wrenches(1.0).ravel()]
+    if not np.isfinite(values).all():
+        tally.not_finite += 1
+        answer.reason = "not finite"
+    elif not sol.converged:
+        answer.reason = sol.status.name
+    else:
+        answer.case = Case.of(scene.origin, scene.insertion, obstacles, sol)
+    return answer
+
+
+def _judge(answers: Iterable[Answer], tally: Tally) -> None:
+    """Judge all converged answers of one kind at once."""
+    claimed = [answer for answer in answers if answer.case is not None]
+    for answer, reason in zip(claimed, findings([a.case for a in claimed if a.case]), strict=True):
+        if reason:
+            answer.reason = f"REFUTED {reason}"
+            tally.refuted += 1
+            tally.folded += reason.startswith("folded")
+            tally.penetrating += reason.startswith("penetrating")
+
+
+def run_chunk(
+    job: tuple[str, int, int, int, int, tuple[str, ...]],
+) -> tuple[str, dict[str, Tally], list[dict]]:
+    """Return the tallies and saved cases of one chunk: class, seed, number, scenes, scenes to search, kinds of hints."""
+    name, seed, number, count, search, kinds = job
+    maker = Maker(name, seed, number)
+    chained = [maker.scene(True) for _ in range(count if "good" in kinds else (count + 1) // 2)]
+    half = (count + 1) // 2
+    mixed = chained[:half] + [maker.scene(False) for _ in range(count - half)]
+    tallies = {kind: Tally() for kind in kinds}
+    answers: dict[str, list[Answer]] = {}
+    for kind in kinds:
+        scenes = chained if kind == "good" else mixed
+        answers[kind] = [_solve(s, s.hinted(kind) or s.obstacles, tallies[kind]) for s in scenes]
+        _judge(answers[kind], tallies[kind])
+    saved: list[dict] = []
+    searched = set(np.random.default_rng([seed, number]).permutation(count)[:search].tolist())
+    for kind in kinds:
+        scenes = chained if kind == "good" else mixed
+        for i, (scene, answer) in enumerate(zip(scenes, answers[kind], strict=True)):
+            others = [(scene.known, "the path that the scene was made for")] if scene.known else []
+            if kind == "none":
+                others += _others(scene, answers, i, len(scenes) == count, half)
+                if i in searched:
+                    start = answer.case if not answer.reason else None
+                    rng = np.random.default_rng([seed, number, i])
+                    tallies[kind].searched += 1
+                    others.append(
+                        (shortest(scene.origin, scene.insertion, scene.obstacles, rng, start), "search")
+                    )
+            best, how = min(
+                ((case, how) for case, how in others if case), key=lambda x: x[0].length, default=(None, "")
+            )
+            reason = _compared(answer, best, kind, tallies[kind])
+            if reason:
+                saved.append(
+                    plain(
+                        {
+                            "class": name,
+                            "hints": kind,
+                            "place": [seed, number, i],
+                            "reason": reason,
+                            "scene": describe(scene.origin, scene.insertion, answer.obstacles),
+                            "best": best and {"length": best.length, "how": how, "contacts": best.contacts},
+                        }
+                    )
+                )
+    return name, tallies, saved
+
+
+def _others(
+    scene: Scene, answers: dict[str, list[Answer]], i: int, same: bool, half: int
+) -> list[tuple[Case | None, str]]:
+    """Return the certified answers for the same scene with hints."""
+    found = []
+    for kind in ("good", "random"):
+        if kind in answers and (kind == "random" or i < half):
+            other = answers[kind][i]
+            if not other.reason:
+                found.append((other.case, f"{kind} hints"))
+    return found if same else []
+
+
+def _compared(answer: Answer, best: Case | None, kind: str, tally: Tally) -> str:
+    """Return why an answer is worth saving, and count it."""
+    status = answer.sol.status.name if answer.sol is not None else ""
+    if status in REFUSALS:
+        tally.refused_wrongly += best is not None and kind != "random"
+    if kind == "none" and best is not None and answer.case is not None and not answer.reason:
+        tally.compared += 1
+        if answer.case.length > best.length * (1.0 + SHORTER):
+            tally.longer += 1
+            return f"LONGER by {answer.case.length - best.length:.2e} m"
+    return answer.reason
+
+
+# ------------------------------------------------------------------------------------------ printing
+
+COLUMNS = (
+    ("class", "<17"),
+    ("hints", "<6"),
+    ("scenes", ">6"),
+    ("not converged", ">13"),
+    ("no path exists", ">14"),
+    ("refuted", ">7"),
+    ("folded", ">6"),
+    ("penetrating", ">11"),
+    ("raised", ">6"),
+    ("NaN", ">3"),
+    ("longer", ">14"),
+    ("evaluations", ">11"),
+    ("µs", ">13"),
+)
+
+
+def row_of(name: str, hints: str, numbers: dict[str, Any]) -> list[str]:
+    """Return the cells of one line of the table."""
+    lost, scenes = numbers["not_converged"], numbers["scenes"]
+    share = f"{lost} ({100 * lost / scenes:.2g} %)" if lost else "0"
+    refused = str(numbers["refused"])
+    if numbers["refused_wrongly"]:
+        refused += f" ({numbers['refused_wrongly']} do)"
+    longer = f"{numbers['longer']} of {numbers['compared']}" if hints == "none" else "-"
+    return [
+        name,
+        hints,
+        str(scenes),
+        share,
+        refused,
+        *(str(numbers[key]) for key in ("refuted", "folded", "penetrating", "exceptions", "not_finite")),
+        longer,
+        f"{numbers['evaluations_median']:.0f}, {numbers['evaluations_most']}",
+        f"{numbers['us_median']:.0f}, {numbers['us_p95']:.0f}",
+    ]
+
+
+def table(results: dict[str, dict[str, dict]], markdown: bool) -> str:
+    """Return the table of all classes as text, or as Markdown."""
+    rows = [row_of(name, kind, numbers) for name, kinds in results.items() for kind, numbers in kinds.items()]
+    names = [name for name, _ in COLUMNS]
+    if markdown:
+        rule = ["---" if width[0] == "<" else "---:" for _, width in COLUMNS]
+        return "\n".join("| " + " | ".join(cells) + " |" for cells in (names, rule, *rows))
+    lines = [
+        " ".join(f"{cell:{width}}" for cell, (_, width) in zip(cells, COLUMNS, strict=True))
+        for cells in (names, *rows)
+    ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+NOTES = (
+    "not converged: no path and no reason why there is none; no path exists: OUT_OF_RANGE or NO_GEODESIC (in brackets: a path\n"
+    "is known all the same); longer: without hints, than the shortest of all other paths known for the scene by more than 1e-6;\n"
+    "evaluations (median, most): of all residuals at once; µs (median, 95 %): solve_path with its checks in Python."
+)
+
+
+def arguments() -> argparse.Namespace:
+    """Return the options of the command line, checked."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--scenes", type=int, default=1000, help="scenes of each class (default 1000)")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--save", type=Path, help="write the scenes that did not converge to this JSON file")
-    options = parser.parse_args()
-    if options.scenes < 1:
-        parser.error("--scenes must be at least 1")
-    rng = np.random.default_rng(options.seed)
-    lost, wrong = [], 0
-    print(
-        f"{'class':<12} {'hints':<7} {'scenes':>6} {'converged':>9} {'refuted':>7}  {'median':>6} {'most':>5}  others"
+    parser.add_argument(
+        "--scenes", type=int, default=200, help="scenes of each class and kind of hints (default 200)"
     )
-    for name, kinds in ROWS.items():
-        for hints in (False, True):
-            counts: collections.Counter[str] = collections.Counter()
-            evaluations = []
-            refuted = 0
-            started = time.perf_counter()
-            for _ in range(options.scenes):
-                origin, insertion, row = random_scene(rng, kinds, hints)
-                sol = mw.solve_path(origin, insertion, row)
-                counts[sol.status.name] += 1
-                evaluations.append(sol.evaluations)
-                if not sol.converged:
-                    lost.append({"status": sol.status.name, **describe(origin, insertion, row)})
-                    continue
-                try:
-                    check_path(origin, insertion, row, sol)
-                except AssertionError:
-                    refuted += 1
-                    lost.append({"status": "REFUTED", **describe(origin, insertion, row)})
-            wrong += refuted
-            others = ", ".join(
-                f"{count} {status}" for status, count in counts.items() if status != "CONVERGED"
-            )
-            hint = "random" if hints else "none"
-            seconds = time.perf_counter() - started
-            print(
-                f"{name:<12} {hint:<7} {options.scenes:>6} {counts['CONVERGED']:>9} {refuted:>7}"
-                f"  {np.median(evaluations):>6.0f} {max(evaluations):>5}  {others or '-'}   ({seconds:.0f} s)",
-                flush=True,
-            )
-    print("median, most: evaluations of all residuals, closed-form wraps of every obstacle counted like one")
+    parser.add_argument("--classes", nargs="+", choices=CLASSES, default=list(CLASSES), metavar="CLASS")
+    parser.add_argument("--hints", nargs="+", choices=HINTS, default=list(HINTS))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--multistart",
+        type=int,
+        default=20,
+        metavar="N",
+        help="scenes of each class searched anew (default 20)",
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
+    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
+    parser.add_argument("--save", type=Path, help="write every case that did not hold to this JSON file")
+    parser.add_argument(
+        "--replay", nargs="+", metavar=("FILE", "INDEX"), help="solve saved cases again, all or one"
+    )
+    options = parser.parse_args()
+    for name, least in (("scenes", 1), ("multistart", 0), ("jobs", 1), ("seed", 0)):
+        if getattr(options, name) < least:
+            parser.error(f"--{name} must be at least {least}")
+    for file in (options.json, options.save):
+        if file is not None and not file.parent.is_dir():
+            parser.error(f"there is no folder {file.parent}")
+    if options.replay and (len(options.replay) > 2 or not Path(options.replay[0]).is_file()):
+        parser.error("--replay takes the file of an earlier --save, and perhaps the number of one case")
+    return options
+
+
+def jobs_of(options: argparse.Namespace) -> list[tuple]:
+    """Return the chunks of all classes, each with its share of the scenes to be searched."""
+    jobs = []
+    kinds = tuple(kind for kind in HINTS if kind in options.hints)
+    for name in options.classes:
+        size = CHUNK[len(CLASSES[name])]
+        left, search = options.scenes, min(options.multistart, options.scenes)
+        for number in range(math.ceil(options.scenes / size)):
+            count = min(size, left)
+            now = math.ceil(search * count / left)
+            jobs.append((name, options.seed, number, count, now, kinds))
+            left, search = left - count, search - now
+    return jobs
+
+
+def main() -> int:
+    options = arguments()
+    if options.replay:
+        replay(Path(options.replay[0]), int(options.replay[1]) if len(options.replay) == 2 else None)
+        return 0
+    jobs = jobs_of(options)
+    tallies: dict[str, dict[str, Tally]] = {}
+    saved: list[dict] = []
+    started = time.perf_counter()
+    with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
+        results = pool.map(run_chunk, jobs) if options.jobs > 1 else map(run_chunk, jobs)
+        for name, found, cases in tqdm(results, total=len(jobs), unit="chunk", smoothing=0.0):
+            for kind, tally in found.items():
+                tallies.setdefault(name, {}).setdefault(kind, Tally()).add(tally)
+            saved += cases
+            if options.save:
+                options.save.write_text(json.dumps(saved), encoding="utf-8")
+    numbers = {
+        name: {kind: tally.numbers() for kind, tally in kinds.items()} for name, kinds in tallies.items()
+    }
+    print(table(numbers, options.markdown))
+    print(f"\n{NOTES}\n\n{PEERS}\n\n{time.perf_counter() - started:.0f} s, seed {options.seed}")
     if options.save:
-        options.save.write_text(json.dumps(lost))
-        print(f"{len(lost)} cases: {options.save}")
-    return 1 if wrong else 0
+        print(f"{len(saved)} cases: {options.save}")
+    if options.json:
+        options.json.write_text(json.dumps(numbers, indent=1), encoding="utf-8")
+    return 1 if any(tally.wrong for kinds in tallies.values() for tally in kinds.values()) else 0
 
 
 if __name__ == "__main__":

@@ -16,6 +16,17 @@ from mjwrap.errors import (
 )
 
 if TYPE_CHECKING:
+    from mjwrap.fitting import (
+        Fit,
+        fit_capsule,
+        fit_cone,
+        fit_cylinder,
+        fit_ellipsoid,
+        fit_elliptic_cylinder,
+        fit_sphere,
+        fit_torus,
+        mesh_points,
+    )
     from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle, PathActuator
     from mjwrap.paths import (
         Contact,
@@ -49,6 +60,15 @@ _HOMES = {
     "ViaPoint": "paths",
     "solve_path": "paths",
     "solve_sweep": "paths",
+    "Fit": "fitting",
+    "fit_capsule": "fitting",
+    "fit_cone": "fitting",
+    "fit_cylinder": "fitting",
+    "fit_ellipsoid": "fitting",
+    "fit_elliptic_cylinder": "fitting",
+    "fit_sphere": "fitting",
+    "fit_torus": "fitting",
+    "mesh_points": "fitting",
     "DeGrooteFregly2016": "muscles",
     "MuJoCoMuscle": "muscles",
     "PathActuator": "muscles",
@@ -64,6 +84,7 @@ __all__ = [
     "DeGrooteFregly2016",
     "Ellipsoid",
     "EllipticCylinder",
+    "Fit",
     "GeometryError",
     "MjwrapError",
     "ModelError",
@@ -82,6 +103,14 @@ __all__ = [
     "SweepSolution",
     "Torus",
     "ViaPoint",
+    "fit_capsule",
+    "fit_cone",
+    "fit_cylinder",
+    "fit_ellipsoid",
+    "fit_elliptic_cylinder",
+    "fit_sphere",
+    "fit_torus",
+    "mesh_points",
     "solve_path",
     "solve_sweep",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import coupling, layout, muscle, readiness
-from mjwrap.mjcf import SURFACES, MuscleDeclaration
+from mjwrap.mjcf import MuscleDeclaration, Node
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,6 +49,22 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
     return readiness.FROM_CTRL, control, low, high
 
 
+def kernel_rows(node: Node) -> list[Array]:
+    """Return the kernels' rows of a stop, cold: one, or two for a surface that a string may touch twice."""
+    row = np.zeros(layout.ROW)
+    row[layout.S_MODE] = layout.COLD
+    if node.surface is None:
+        return [row]
+    dims = node.surface.dims
+    row[layout.KIND], row[layout.SIZE] = node.surface.kind, node.surface.size
+    row[layout.DIM : layout.DIM + len(dims)] = dims
+    if not node.surface.hollow:
+        return [row]
+    twin = row.copy()
+    twin[layout.TWIN] = 1.0
+    return [row, twin]
+
+
 def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
     """Return the kernels' arrays for a list of muscles."""
     links: list[tuple[int, int, int, int]] = []
@@ -59,17 +75,12 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         for route in declared.routes:
             first = len(links)
             for node in route.nodes:
-                row = np.zeros(layout.ROW)
-                row[layout.S_MODE] = layout.COLD
-                if node.geom >= 0:
-                    row[layout.KIND] = SURFACES[int(model.geom_type[node.geom])]
-                    row[layout.DIM] = row[layout.SIZE] = model.geom_size[node.geom, 0]
-                    row[layout.DIM + 1] = np.inf  # MuJoCo wraps cylinders of any length
-                    body = int(model.geom_bodyid[node.geom])
-                else:
-                    body = int(model.site_bodyid[node.site])
-                rows.append(row)
-                links.append((node.site, node.geom, node.hint_site, body))
+                found = kernel_rows(node)
+                on_geom = node.geom >= 0
+                body = int(model.geom_bodyid[node.geom] if on_geom else model.site_bodyid[node.site])
+                for k, row in enumerate(found):
+                    rows.append(row)
+                    links.append((node.site, node.geom, node.hint_site if k == 0 else -1, body))
             bodies = int(model.site_bodyid[route.origin]), int(model.site_bodyid[route.insertion])
             routes.append((first, len(links), route.origin, route.insertion, *bodies, m))
             weights.append(route.weight)

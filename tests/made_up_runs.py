@@ -63,6 +63,7 @@ class Muscles:
                 insertion_site=sites["insertion"],
                 via_sites=[sites["via"]] if i == 0 else [],
                 geoms=[drum] if i == 0 else [],
+                surfaces=[mw.Cylinder(0.05)] if i == 0 else [],
             )
             for i, name in enumerate(names)
         ]

@@ -1,4 +1,4 @@
-"""Random MJCF models whose muscles run over rows of cylinders, spheres and via points on bodies of every kind.
+"""Random MJCF models whose muscles run over rows of surfaces and via points on bodies of every kind.
 
 Elements of a row stand 0.1 m apart along x at the reference pose and are passed above and below in turn. Each is fixed
 to some body: the world, a mocap body, or one that moves by free, ball, hinge or slide joints; every body frame, centre
@@ -17,7 +17,25 @@ SPACING = 0.1  # [m]
 RADIUS = 0.03  # [m]
 # Of a surface's centre from the straight line, away from the side on which it is passed [m]. A string whose chord runs
 # close to a sphere's centre turns fast with small motions, which spoils difference quotients: spheres stand off.
-OFFSET = {"cylinder": 0.012, "sphere": 0.02}
+OFFSET = {"cylinder": 0.012, "sphere": 0.02, "ellipsoid": 0.018, "torus": 0.012, "hole": 0.006}
+SIMPLE = ("cylinder", "sphere")
+ALL = (*SIMPLE, "ellipsoid", "capsule", "cone", "elliptic_cylinder", "torus", "hole")
+RING, TUBE = 0.06, 0.025  # of the torus through whose hole a string runs [m]
+# type and size of the geom, and the numeric that gives it another shape
+SHAPES = {
+    "cylinder": ("cylinder", f"{RADIUS} 0.05", ""),
+    "sphere": ("sphere", f"{RADIUS}", ""),
+    "ellipsoid": ("ellipsoid", "0.03 0.034 0.045", ""),
+    "capsule": ("capsule", "0.03 0.04", ""),
+    "cone": ("sphere", "0.001", '<numeric name="mjwrap_cone_size" data="0.033 0.027 0.05"/>'),
+    "elliptic_cylinder": (
+        "box",
+        "0.01 0.01 0.01",
+        '<numeric name="mjwrap_elliptic_cylinder_size" data="0.03 0.034"/>',
+    ),
+    "torus": ("sphere", "0.001", '<numeric name="mjwrap_a_torus_size" data="0.018 0.014"/>'),
+    "hole": ("sphere", "0.001", f'<numeric name="mjwrap_b_torus_size" data="{RING} {TUBE}"/>'),
+}
 
 
 def _text(values: Vector | list[float]) -> str:
@@ -104,22 +122,29 @@ def _place(rng: np.random.Generator, body: _Body, k: int, kind: str, last: bool)
         return
     tilt = np.zeros(4)
     mujoco.mju_euler2Quat(tilt, np.array([*rng.uniform(-0.15, 0.15, 2), rng.uniform(-3, 3)]), "XYZ")
-    at = np.array([SPACING * k, -side * OFFSET[kind], rng.uniform(-0.003, 0.003)])
+    at = np.array([SPACING * k, -side * OFFSET.get(kind, 0.012), rng.uniform(-0.003, 0.003)])
+    touch = at + np.array([0.0, side * 1.3 * RADIUS, 0.0])
+    if kind == "hole":  # the ring's axis lies along the string, which touches the tube from within
+        across = np.array([0.0, side, 0.0])
+        touch, at = at + TUBE * across, at + RING * across
+        turned = np.zeros(4)
+        mujoco.mju_mulQuat(turned, np.array([0.5**0.5, 0.0, 0.5**0.5, 0.0]), tilt)
+        tilt = turned
     pos, quat = _relative(at, tilt, body.pos, body.quat)
-    size = f"{RADIUS} 0.05" if kind == "cylinder" else f"{RADIUS}"
+    shape, size, _ = SHAPES[kind]
     body.content.append(
-        f'<geom name="e{k}" type="{kind}" size="{size}" pos="{_text(pos)}" quat="{_text(quat)}"'
+        f'<geom name="e{k}" type="{shape}" size="{size}" pos="{_text(pos)}" quat="{_text(quat)}"'
         ' contype="0" conaffinity="0" mass="0"/>'
     )
-    hint, _ = _relative(at + np.array([0.0, side * 1.3 * RADIUS, 0.0]), body.quat, body.pos, body.quat)
+    hint, _ = _relative(touch, body.quat, body.pos, body.quat)
     body.content.append(f'<site name="hint{k}" pos="{_text(hint)}"/>')
 
 
-def random_model(seed: int) -> mujoco.MjModel:
+def random_model(seed: int, surfaces: tuple[str, ...] = SIMPLE) -> mujoco.MjModel:
     """A model with three muscles over 3 to 7 elements each, one of them with via points; no gravity, no contacts."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(4, 8))
-    kinds = ["site", *rng.choice(["cylinder", "sphere"], count).tolist(), "site"]
+    kinds = ["site", *rng.choice(surfaces, count).tolist(), "site"]
     if count > 4:
         kinds[count // 2] = "site"  # a via point between rows
     bodies = _bodies(rng, 5)
@@ -146,7 +171,7 @@ def random_model(seed: int) -> mujoco.MjModel:
         "front": [*(f"e{k}" for k in range(4)), "second"],
         "back": ["first", *(f"e{k}" for k in range(3, last + 1))],
     }
-    tuples = []
+    tuples = sorted({SHAPES[kind][2] for kind in kinds if kind != "site"} - {""})
     for m, (name, route) in enumerate(routes.items()):
         tuples.append(f'<numeric name="mjwrap_{name}_optimal_force" data="{40 + 30 * m}"/>')
         tuples.append(f'<tuple name="mjwrap_{name}">')
@@ -156,6 +181,10 @@ def random_model(seed: int) -> mujoco.MjModel:
                 tuples.append(f'<element objtype="site" objname="{stop}"/>')
             else:
                 tuples.append(f'<element objtype="geom" objname="{stop}"/>')
+                if SHAPES[kind][2]:
+                    tuples.append(
+                        f'<element objtype="numeric" objname="{SHAPES[kind][2].split(chr(34))[1]}"/>'
+                    )
                 tuples.append(f'<element objtype="site" objname="hint{stop[1:]}" prm="1"/>')
         tuples.append(f'<element objtype="numeric" objname="mjwrap_{name}_optimal_force"/></tuple>')
     body = bodies[0].xml(rng)

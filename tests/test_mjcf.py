@@ -50,16 +50,17 @@ def test_a_native_muscle_is_a_declaration_as_it_stands() -> None:
     )
     elbow, ball = ids(model, GEOM, "elbow", "ball")
     nodes = (
-        Node(geom=elbow, hint_site=side),
+        Node(geom=elbow, hint_site=side, surface=mw.Cylinder(0.025)),
         Node(site=via),
         Node(site=middle),
-        Node(geom=ball, hint_site=ball_side),
+        Node(geom=ball, hint_site=ball_side, surface=mw.Sphere(0.015)),
     )
     assert muscle.routes == (Route(origin, nodes, insertion),)
     assert (muscle.name, muscle.law, muscle.actuator, muscle.tendon) == ("extensor", "mujoco", 0, 0)
     assert (muscle.origin_site, muscle.insertion_site) == (origin, insertion)
     assert muscle.via_sites == [via, middle]
     assert muscle.geoms == [elbow, ball]
+    assert muscle.surfaces == [mw.Cylinder(0.025), mw.Sphere(0.015)]
     assert isinstance(muscle.parameters, mw.MuJoCoMuscle)
     assert muscle.parameters.prm == tuple(model.actuator_gainprm[0, :9])
     assert muscle.parameters.length_range == (0.3, 0.6)
@@ -216,7 +217,11 @@ def test_a_tuple_has_a_route_of_its_own_with_surfaces_in_a_row() -> None:
     muscle = only(model)
     origin, side, wrist_side, insertion = ids(model, SITE, "origin", "elbow_side", "wrist_side", "insertion")
     elbow, ball, wrist = ids(model, GEOM, "elbow", "ball", "wrist")
-    nodes = Node(geom=elbow, hint_site=side), Node(geom=ball), Node(geom=wrist, hint_site=wrist_side)
+    nodes = (
+        Node(geom=elbow, hint_site=side, surface=mw.Cylinder(0.025)),
+        Node(geom=ball, surface=mw.Sphere(0.015)),
+        Node(geom=wrist, hint_site=wrist_side, surface=mw.Cylinder(0.012)),
+    )
     assert muscle.routes == (Route(origin, nodes, insertion),)
     assert (muscle.name, muscle.actuator, muscle.tendon) == ("extensor", 0, 0)
     assert muscle.parameters == mw.DeGrooteFregly2016(600.0, 0.12, 0.3)

@@ -14,7 +14,7 @@ import mjwrap as mw
 from mjwrap.mjcf import read_declarations, read_model
 
 SITES = "origin, elbow_side, elbow_inside, via, middle, ball_side, wrist_side, insertion"
-SURFACES = "elbow, ball, wrist"
+SURFACES = "elbow, egg, ulna, ball, palm, wrist"
 NUMERICS = (
     "max_isometric_force, optimal_fiber_length, tendon_slack_length, pennation_angle, max_contraction_velocity, "
     "fiber_damping, activation_time_constants, optimal_force"
@@ -55,8 +55,6 @@ ROUTES = {
         ["site 'via'", "not geom 'elbow' with a hint", SURFACES],
     ),
     "box": ([ORIGIN, element("geom", "crate"), INSERTION], ["geom 'crate'", "of type box", SURFACES]),
-    "ellipsoid": ([ORIGIN, element("geom", "egg"), INSERTION], ["geom 'egg'", "of type ellipsoid", SURFACES]),
-    "capsule": ([ORIGIN, element("geom", "ulna"), INSERTION], ["geom 'ulna'", "of type capsule", SURFACES]),
     "strange prm": ([ORIGIN, element("site", "via", 2), INSERTION], ["site 'via'", "prm=2", "1 the hint"]),
 }
 
@@ -88,7 +86,8 @@ def test_radii_of_a_model_that_was_changed_in_memory(radius: float) -> None:
     model = compiled()
     model.geom("ball").size[0] = radius
     text = message(model)
-    assert f"muscle 'extensor': geom 'ball' has radius {radius}" in text
+    wanted = f"Sphere: radius must be finite and positive [m], not {radius}"
+    assert f"muscle 'extensor': geom 'ball': {wanted}" in text
 
 
 def test_a_pulley_divisor_that_was_changed_in_memory() -> None:

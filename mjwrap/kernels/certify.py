@@ -12,7 +12,7 @@ from mjwrap.kernels.shape import turn_into_frame
 KIND, DIM = lay.KIND, lay.DIM
 S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
 W_P, W_Q, W_BP, W_BQ, W_JAC = lay.W_P, lay.W_Q, lay.W_BP, lay.W_BQ, lay.W_JAC
-W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
+W_X, W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_X, lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
 
 STABLE = -1e-9  # smallest admitted stiffness against a sideways shift, as a share of the segment's own
 LEAST_PRESSURE = -1e-9  # of the normal curvature times the surface's size
@@ -107,3 +107,73 @@ def minimal(lo, hi, node):
         return True
     over = 1.0 / max(node[last, W_LQ], SHORTEST)
     return over + c > STABLE * over
+
+
+@jit
+def slip(lo, hi, node, size):
+    """Write to columns W_Y + 1, W_Y + 2 a sideways variation (d1, d2) by which the path of the last evaluation shortens.
+
+    The second variation's pivots, as in `minimal`, with the shifts x, y of P and Q for unknowns; the first pivot that is
+    not positive gives a direction of negative curvature. Scaled to `size`, in radii. Returns False where there is none.
+    """
+    last = -1
+    c, turn = 0.0, 0.0
+    failed, far = -1, False
+    for k in range(lo, hi):
+        if node[k, S_MODE] != lay.TOUCHED:
+            continue
+        over = 1.0 / max(node[k, W_L], SHORTEST)
+        node[k, W_X] = 0.0
+        if last < 0:
+            c = over
+        else:
+            turn = (
+                node[last, W_BQ] * node[k, W_BP]
+                + node[last, W_BQ + 1] * node[k, W_BP + 1]
+                + node[last, W_BQ + 2] * node[k, W_BP + 2]
+            )
+            pivot = over + c
+            if pivot <= 0.0:
+                failed, far = last, True
+                break
+            node[k, W_X] = turn * over / pivot  # y of the last one that goes with x = 1 here
+            c = over - turn * turn * over * over / pivot
+        field = node[k, W_JAC] + c * node[k, W_JAC + 2]
+        if field <= 0.0 or node[k, lay.W_RMIN] <= 0.0:
+            failed = k
+            break
+        node[k, W_X + 1] = 1.0 / field  # x that goes with y = 1
+        c = (node[k, W_JAC + 1] + c * node[k, W_JAC + 3]) / field
+        last = k
+    if failed < 0 and last >= 0 and 1.0 / max(node[last, W_LQ], SHORTEST) + c <= 0.0:
+        failed, far = last, True
+    if failed < 0:
+        return False
+    x, y = 1.0, 0.0
+    if far:
+        x, y = node[failed, W_X + 1], 1.0
+    most = 0.0
+    for k in range(failed, lo - 1, -1):
+        if node[k, S_MODE] != lay.TOUCHED:
+            continue
+        node[k, lay.W_Y + 1] = x
+        r = node[k, W_JAC + 2]
+        node[k, lay.W_Y + 2] = (y - node[k, W_JAC] * x) / r if abs(r) > SHORTEST else 0.0
+        most = max(most, max(abs(x), abs(y)) / node[k, lay.SIZE])
+        y = node[k, W_X] * x
+        x = node[_before(k, lo, node), W_X + 1] * y
+    for k in range(lo, hi):
+        if node[k, S_MODE] == lay.TOUCHED:
+            scale = size / most if k <= failed else 0.0
+            node[k, lay.W_Y + 1] *= scale
+            node[k, lay.W_Y + 2] = min(max(node[k, lay.W_Y + 2] * scale, -1.0), 1.0)
+    return True
+
+
+@jit
+def _before(k, lo, node):
+    """Return the touched node before k, or k."""
+    for j in range(k - 1, lo - 1, -1):
+        if node[j, S_MODE] == lay.TOUCHED:
+            return j
+    return k

@@ -44,7 +44,7 @@ def _plane_normal(ax, ay, az, bx, by, bz, k, node):
     if size > 1e-13 * scale:
         return wx / size, wy / size, wz / size
     hx, hy, hz = 0.0, 0.0, 0.0
-    if node[k, HINT] != 0.0:
+    if node[k, HINT] > 0.0:
         hx, hy, hz = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
     elif node[k, S_MODE] == lay.TOUCHED:
         hx, hy, hz = node[k, S_T], node[k, S_T + 1], node[k, S_T + 2]

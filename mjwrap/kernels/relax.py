@@ -17,6 +17,7 @@ KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_P, W_Q, W_L, W_LQ = lay.W_P, lay.W_Q, lay.W_L, lay.W_LQ
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
+SEARCH_EVERY = 6  # passes: a search costs as much as fifty wraps
 
 
 @jit
@@ -28,7 +29,7 @@ def _following(k, hi, ends, node):
     for j in range(k + 1, hi):
         if node[j, S_MODE] == TOUCHED:
             return node[j, W_P], node[j, W_P + 1], node[j, W_P + 2]
-        if node[j, S_MODE] == COLD and node[j, HINT] != 0.0:
+        if node[j, S_MODE] == COLD and node[j, HINT] > 0.0:
             hx, hy, hz = node[j, HINT + 1], node[j, HINT + 2], node[j, HINT + 3]
             return (
                 node[j, ROT] * hx + node[j, ROT + 1] * hy + node[j, ROT + 2] * hz + node[j, POS] - ends[0],
@@ -50,13 +51,13 @@ def _following(k, hi, ends, node):
 def relax(lo, hi, ends, node, passes):
     """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`.
 
-    Lost contacts are searched for in the first pass only.
+    Lost contacts are searched for in some of the passes.
     """
     for i in range(passes):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
             qx, qy, qz = _following(k, hi, ends, node)
-            wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i == 0)
+            wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i % SEARCH_EVERY == 0)
             if node[k, S_MODE] == TOUCHED:
                 geodesic(k, node, ends[0], ends[1], ends[2])
                 x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
@@ -87,7 +88,7 @@ def shorten(lo, hi, ends, node, passes):
     saved = np.empty((hi - lo, lay.STATE))
     best = path_length(lo, hi, ends, node)
     for k in range(lo, hi):
-        if not branched(node[k, KIND]) or node[k, HINT] != 0.0 or node[k, S_MODE] != TOUCHED:
+        if not branched(node[k, KIND]) or node[k, HINT] > 0.0 or node[k, S_MODE] != TOUCHED:
             continue
         if abs(node[k, S_SWEEP]) < 0.5 * math.pi:
             continue

@@ -111,7 +111,7 @@ def _sweep(k, node, ax, ay, bx, by, alpha_a, alpha_b, hint_x, hint_y, radius):
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     if node[k, S_MODE] != lay.COLD:
         return follow(sweep, node[k, S_SWEEP])
-    if node[k, HINT] != 0.0:
+    if node[k, HINT] > 0.0:
         return _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
     return sweep
 

@@ -273,7 +273,7 @@ def wrap_searched(k, ends, node, search):
     low, share = dip(node, k, ax, ay, az, bx, by, bz)
     straight = _straight_sweep(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
     hooked = branch and abs(straight - follow(straight, before)) > SAME_BRANCH
-    hinted = mode == COLD and node[k, HINT] != 0.0
+    hinted = mode == COLD and node[k, HINT] > 0.0
     if low >= -DEPTH * node[k, SIZE] and not hooked:
         if hinted and node[k, KIND] >= lay.TORUS and node[k, KIND] != lay.CAPSULE:
             _place(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)

@@ -12,23 +12,25 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.certify import minimal
+from mjwrap.kernels.certify import minimal, slip
 from mjwrap.kernels.direct import holds
-from mjwrap.kernels.geodesics import geodesic
+from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.relax import path_length, relax, shorten
 from mjwrap.kernels.shape import into_frame, project
-from mjwrap.kernels.touch import drop, follow_branch, in_range, split, take_in
+from mjwrap.kernels.touch import drop, follow_branch, in_range, join, split, take_in
 
 DIM, POS, ROT = lay.DIM, lay.POS, lay.ROT
-S_MODE, W_OLD = lay.S_MODE, lay.W_OLD
+HINT, S_MODE, W_OLD, W_Y = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Y
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 MAX_NEWTON = 25
 MAX_ROUNDS = 50  # changes of the set of touched obstacles, repairs included
 MAX_REPAIRS = 4
 COLD_PASSES = 3  # of obstacle-by-obstacle wrapping before Newton's method is tried
-REPAIR_PASSES = 7  # the first repair; further ones take about four times as many each
+REPAIR_PASSES = 7  # the first repair; further ones take about twice as many each
+AFRESH = 2  # repairs after which a cold start forgets its hints
+KICK = 0.3  # off a saddle, in radii
 CALM = 4  # changes of the set of touched obstacles, beyond one for each, that count as going round in circles
 
 
@@ -55,6 +57,23 @@ def _restore(lo, hi, ends, node):
             node[k, S_MODE + i] = node[k, W_OLD + i]
         if node[k, S_MODE] == TOUCHED:
             geodesic(k, node, ends[0], ends[1], ends[2])
+
+
+@jit
+def _start_afresh(lo, hi, node):
+    """Forget what was found and ignore the hints: they may ask for a side on which no string holds."""
+    for k in range(lo, hi):
+        node[k, S_MODE] = COLD
+        node[k, HINT] = -abs(node[k, HINT])
+
+
+@jit
+def _slip_off(lo, hi, node, sign):
+    """Move a path that is a saddle of length a little down the side on which a string would slip."""
+    if slip(lo, hi, node, KICK):
+        for k in range(lo, hi):
+            if node[k, S_MODE] == TOUCHED:
+                displace(k, 0.0, sign * node[k, W_Y + 1], sign * node[k, W_Y + 2], 0.0, node)
 
 
 @jit
@@ -117,7 +136,7 @@ def _solve(lo, hi, ends, node, tol, direct):
             evaluations += e
             good = error <= tol and follow_branch(lo, hi, node)
         if good and minimal(lo, hi, node):
-            dropped = drop(lo, hi, node)
+            dropped = drop(lo, hi, node) + join(lo, hi, ends, node)
             added, status = take_in(lo, hi, ends, node)
             if dropped + added == 0:
                 settled = True
@@ -132,9 +151,14 @@ def _solve(lo, hi, ends, node, tol, direct):
         if repairs == MAX_REPAIRS or (hi - lo == 1 and repairs == 1):
             status = lay.NOT_MINIMAL if good and changes == 0 else lay.NOT_CONVERGED
             break
-        if repairs == 0:
+        saddle = good and changes == 0
+        if repairs == 0 and not saddle:
             _restore(lo, hi, ends, node)
-        passes = (REPAIR_PASSES + repairs) << 2 * repairs if hi - lo > 1 else 1
+        if cold and repairs == AFRESH:
+            _start_afresh(lo, hi, node)
+        elif saddle:
+            _slip_off(lo, hi, node, 1.0 if repairs % 2 == 0 else -1.0)
+        passes = (REPAIR_PASSES + repairs) << repairs if hi - lo > 1 else 1
         evaluations += relax(lo, hi, ends, node, passes)
         repairs += 1
         changes = 0
@@ -148,6 +172,8 @@ def _solve(lo, hi, ends, node, tol, direct):
                 status = lay.NOT_CONVERGED
     elif status == lay.CONVERGED and not in_range(lo, hi, ends, node):
         status = lay.OUT_OF_RANGE
+    for k in range(lo, hi):
+        node[k, HINT] = abs(node[k, HINT])
     total = path_length(lo, hi, ends, node)
     if not math.isfinite(error):
         status = lay.NOT_CONVERGED

@@ -16,6 +16,7 @@ S_MODE, S_SWEEP, S_P, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_ARC
 W_P, W_Q = lay.W_P, lay.W_Q
 FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
+MET = 1e-5  # contacts on both sides of a hollow that are so near, in the surface's size, have met
 PIECES = 24  # of a geodesic, to find where it runs through a hollow
 DEPTH = -1e-9  # a segment that dips less below the surface that it leaves or meets, in its size, only touches it
 
@@ -34,7 +35,9 @@ def follow_branch(lo, hi, node):
     """
     same = True
     for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED and branched(node[k, KIND]) and node[k, lay.TWIN] == 0.0:
+        if node[k, S_MODE] != TOUCHED or node[k, S_ARC] < 0.0:
+            continue
+        if branched(node[k, KIND]) and node[k, lay.TWIN] == 0.0:
             angle = swept(k, node)
             if _has_twin(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
                 node[k, S_SWEEP] = angle
@@ -132,6 +135,28 @@ def split(lo, hi, ends, node):
         geodesic(k, node, ends[0], ends[1], ends[2])
         geodesic(k + 1, node, ends[0], ends[1], ends[2])
         count += 1
+    return count
+
+
+@jit
+def join(lo, hi, ends, node):
+    """Make one contact of two that have met, where the surface in between bears the string; return how many."""
+    count = 0
+    for k in range(lo, hi - 1):
+        if node[k, S_MODE] != TOUCHED or not _has_twin(k, hi, node) or node[k + 1, S_MODE] != TOUCHED:
+            continue
+        if node[k, lay.W_LQ] > MET * node[k, SIZE]:
+            continue
+        arc = node[k, S_ARC]
+        node[k, S_ARC] = arc + node[k, lay.W_LQ] + node[k + 1, S_ARC]
+        geodesic(k, node, ends[0], ends[1], ends[2])
+        if node[k, lay.W_KMIN] >= 0.0:
+            node[k + 1, S_MODE] = FREE
+            node[k + 1, S_ARC] = 0.0
+            count += 1
+        else:
+            node[k, S_ARC] = arc
+            geodesic(k, node, ends[0], ends[1], ends[2])
     return count
 
 

@@ -8,10 +8,8 @@ from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Rout
 from mjwrap.mjcf.files import read_model
 from mjwrap.mjcf.names import name_of, names
 from mjwrap.mjcf.reader import read_declarations
-from mjwrap.mjcf.routes import SURFACES
 
 __all__ = [
-    "SURFACES",
     "Declarations",
     "MuscleDeclaration",
     "Node",

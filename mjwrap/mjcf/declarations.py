@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from mjwrap.muscles import Law
+from mjwrap.surfaces import Surface
 
 
 @dataclass(frozen=True)
 class Node:
-    """One stop of a route: a via site or a wrapping geom with, perhaps, the site that hints at its side."""
+    """One stop of a route: a via site, or the surface in a geom's frame with, perhaps, a site as hint at its side."""
 
     site: int = -1
     geom: int = -1
     hint_site: int = -1
+    surface: Surface | None = None
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,13 @@ class MuscleDeclaration:
 
     @property
     def geoms(self) -> list[int]:
-        """Geom ids of the wrapping surfaces, in order."""
+        """Ids of the geoms that carry the wrapping surfaces, in order."""
         return [node.geom for route in self.routes for node in route.nodes if node.geom >= 0]
+
+    @property
+    def surfaces(self) -> list[Surface]:
+        """The wrapping surfaces, in order: one for each of `geoms`."""
+        return [node.surface for route in self.routes for node in route.nodes if node.surface is not None]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.actuators import curves_reason, is_muscle, mujoco_law
 from mjwrap.mjcf.names import listed, name_of
+from mjwrap.mjcf.surfaces import SIZES
 from mjwrap.muscles import DeGrooteFregly2016, Law, PathActuator
 
 OBJ = mujoco.mjtObj
@@ -35,7 +36,8 @@ def read_numerics(model: mujoco.MjModel, ids: list[int]) -> Given:
         fits = [key for key in NUMERICS if key in name]
         if len(fits) != 1:
             raise ModelError(
-                f"numeric '{name}' must contain exactly one of these in its name: {listed(NUMERICS)}"
+                f"numeric '{name}' must contain exactly one of these in its name: {listed(NUMERICS)}; or, directly "
+                f"after a geom whose surface it declares: {listed(SIZES)}"
             )
         if fits[0] in given:
             raise ModelError(f"{fits[0]} is given twice, the second time by numeric '{name}'")

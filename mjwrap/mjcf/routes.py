@@ -6,26 +6,35 @@ from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 import mujoco
-import numpy as np
 
 from mjwrap.errors import ModelError
-from mjwrap.kernels import layout
 from mjwrap.mjcf.declarations import Node, Route
 from mjwrap.mjcf.names import listed, name_of, names
+from mjwrap.mjcf.surfaces import read_surface, wrapping_geoms
 
 OBJ = mujoco.mjtObj
-SURFACES = {
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): layout.CYLINDER,
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): layout.SPHERE,
-}
 
 
 class Stop(NamedTuple):
-    """One element of a list of stops: id of a site, geom or hint (a site), or the divisor of a pulley."""
+    """One element of a list of stops: id of a site, geom, hint (a site) or sizes (a numeric), or a pulley's divisor.
 
-    kind: Literal["site", "geom", "hint", "pulley"]
+    finite: a cylinder geom is wrapped as long as it is drawn, not as an infinite one.
+    """
+
+    kind: Literal["site", "geom", "hint", "sizes", "pulley"]
     index: int = -1
     divisor: float = 1.0
+    finite: bool = False
+
+
+class _Place(NamedTuple):
+    """A site of a route, or a geom with what the elements after it say of it."""
+
+    site: int = -1
+    geom: int = -1
+    finite: bool = False
+    hint: int = -1
+    sizes: int = -1
 
 
 def tendon_stops(model: mujoco.MjModel, tendon: int) -> list[Stop]:
@@ -62,53 +71,57 @@ def build_routes(model: mujoco.MjModel, muscle: str, stops: Iterable[Stop]) -> t
 
 
 def _build_route(model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: float) -> Route:
-    nodes: list[Node] = []
+    places: list[_Place] = []
     for stop in stops:
         if stop.kind == "site":
-            nodes.append(Node(site=stop.index))
+            places.append(_Place(site=stop.index))
         elif stop.kind == "geom":
-            _check_geom(model, muscle, stop.index)
-            nodes.append(Node(geom=stop.index))
-        elif nodes and nodes[-1].geom >= 0 and nodes[-1].hint_site < 0:
-            nodes[-1] = Node(geom=nodes[-1].geom, hint_site=stop.index)
+            places.append(_Place(geom=stop.index, finite=stop.finite))
         else:
-            before = _describe(model, nodes[-1]) if nodes else "nothing"
-            raise ModelError(
-                f"muscle '{muscle}': site '{name_of(model, OBJ.mjOBJ_SITE, stop.index)}' is marked as a hint (prm=1) "
-                f"and must directly follow a geom, not {before}; geoms to wrap: {_list_surfaces(model)}"
-            )
-    if len(nodes) < 2 or nodes[0].site < 0 or nodes[-1].site < 0:
-        path = ", ".join(_describe(model, node) for node in nodes)
+            places[-1:] = [_completed(model, muscle, places[-1] if places else None, stop)]
+    if len(places) < 2 or places[0].site < 0 or places[-1].site < 0:
+        path = ", ".join(_describe(model, place) for place in places)
         raise ModelError(
             f"muscle '{muscle}': its path must begin and end with a site, two at least; it is: {path}; "
             f"sites: {_list_sites(model)}"
         )
-    return Route(nodes[0].site, tuple(nodes[1:-1]), nodes[-1].site, weight)
+    nodes = tuple(_node(model, muscle, place) for place in places[1:-1])
+    return Route(places[0].site, nodes, places[-1].site, weight)
 
 
-def _check_geom(model: mujoco.MjModel, muscle: str, geom: int) -> None:
-    name, kind = name_of(model, OBJ.mjOBJ_GEOM, geom), int(model.geom_type[geom])
-    if kind not in SURFACES:
-        shape = mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
-        raise ModelError(
-            f"muscle '{muscle}': geom '{name}' is of type {shape}; a wrapping surface must be a cylinder or a sphere: "
-            f"{_list_surfaces(model)}"
-        )
-    radius = float(model.geom_size[geom, 0])
-    if not (np.isfinite(radius) and radius > 0.0):
-        raise ModelError(f"muscle '{muscle}': geom '{name}' has radius {radius}; it must be positive [m]")
+def _completed(model: mujoco.MjModel, muscle: str, place: _Place | None, stop: Stop) -> _Place:
+    """Return a geom's place with a hint or sizes added to it."""
+    if place is not None and place.geom >= 0:
+        if stop.kind == "hint" and place.hint < 0:
+            return place._replace(hint=stop.index)
+        if stop.kind == "sizes" and place.sizes < 0:
+            return place._replace(sizes=stop.index)
+    before = _describe(model, place) if place else "nothing"
+    if stop.kind == "hint":
+        what = f"site '{name_of(model, OBJ.mjOBJ_SITE, stop.index)}' is marked as a hint (prm=1) and"
+    else:
+        what = f"numeric '{name_of(model, OBJ.mjOBJ_NUMERIC, stop.index)}' declares a surface and"
+    raise ModelError(
+        f"muscle '{muscle}': {what} must directly follow a geom, not {before}; geoms to wrap: {wrapping_geoms(model)}"
+    )
 
 
-def _describe(model: mujoco.MjModel, node: Node) -> str:
-    if node.geom >= 0:
-        return f"geom '{name_of(model, OBJ.mjOBJ_GEOM, node.geom)}'" + " with a hint" * (node.hint_site >= 0)
-    return f"site '{name_of(model, OBJ.mjOBJ_SITE, node.site)}'"
+def _node(model: mujoco.MjModel, muscle: str, place: _Place) -> Node:
+    if place.geom < 0:
+        return Node(site=place.site)
+    try:
+        surface = read_surface(model, place.geom, place.sizes, place.finite)
+    except ModelError as error:
+        raise ModelError(f"muscle '{muscle}': {error}") from None
+    return Node(geom=place.geom, hint_site=place.hint, surface=surface)
+
+
+def _describe(model: mujoco.MjModel, place: _Place) -> str:
+    if place.geom < 0:
+        return f"site '{name_of(model, OBJ.mjOBJ_SITE, place.site)}'"
+    said = [word for word, given in (("a hint", place.hint >= 0), ("sizes", place.sizes >= 0)) if given]
+    return f"geom '{name_of(model, OBJ.mjOBJ_GEOM, place.geom)}'" + " with " * bool(said) + " and ".join(said)
 
 
 def _list_sites(model: mujoco.MjModel) -> str:
     return listed(names(model, OBJ.mjOBJ_SITE, model.nsite))
-
-
-def _list_surfaces(model: mujoco.MjModel) -> str:
-    fit = (i for i in range(model.ngeom) if int(model.geom_type[i]) in SURFACES)
-    return listed(name_of(model, OBJ.mjOBJ_GEOM, i) for i in fit)

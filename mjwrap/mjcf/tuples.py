@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 import mujoco
 
@@ -11,10 +10,22 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.actuators import is_fixed, pulled_tendon, unfit_reason
 from mjwrap.mjcf.declarations import MuscleDeclaration
 from mjwrap.mjcf.names import listed, name_of
-from mjwrap.mjcf.parameters import activation_times, build_law, choose_law, read_numerics, read_text
+from mjwrap.mjcf.parameters import (
+    NUMERICS,
+    activation_times,
+    build_law,
+    choose_law,
+    read_numerics,
+    read_text,
+)
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
+from mjwrap.mjcf.surfaces import size_keys
 
 OBJ = mujoco.mjtObj
+MARKS = {
+    OBJ.mjOBJ_SITE: ("site", "0 makes it a stop of the path, 1 the hint of the geom before"),
+    OBJ.mjOBJ_GEOM: ("geom", "0 wraps a cylinder of any length, 1 one as long as it is drawn"),
+}
 
 
 @dataclass
@@ -80,9 +91,12 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
         elif kind == OBJ.mjOBJ_TENDON:
             found.tendons.append(item)
         elif kind == OBJ.mjOBJ_SITE:
-            found.stops.append(Stop(_site_kind(model, item, prm), item))
+            found.stops.append(Stop("hint" if _is_marked(model, kind, item, prm) else "site", item))
         elif kind == OBJ.mjOBJ_GEOM:
-            found.stops.append(Stop("geom", item))
+            found.stops.append(Stop("geom", item, finite=_is_marked(model, kind, item, prm)))
+        elif kind == OBJ.mjOBJ_NUMERIC and size_keys(name_of(model, kind, item)):
+            _check_size_name(name_of(model, kind, item))
+            found.stops.append(Stop("sizes", item))
         elif kind == OBJ.mjOBJ_NUMERIC:
             found.numerics.append(item)
         elif kind == OBJ.mjOBJ_TEXT and "law" in name_of(model, kind, item):
@@ -103,13 +117,18 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
     return found
 
 
-def _site_kind(model: mujoco.MjModel, site: int, prm: float) -> Literal["site", "hint"]:
+def _is_marked(model: mujoco.MjModel, kind: mujoco.mjtObj, item: int, prm: float) -> bool:
+    """Return whether a site or geom has prm=1."""
     if prm not in (0.0, 1.0):
-        name = name_of(model, OBJ.mjOBJ_SITE, site)
-        raise ModelError(
-            f"site '{name}' has prm={prm:g}; 0 makes it a stop of the path, 1 the hint of the geom before"
-        )
-    return "hint" if prm == 1.0 else "site"
+        what, meaning = MARKS[kind]
+        raise ModelError(f"{what} '{name_of(model, kind, item)}' has prm={prm:g}; {meaning}")
+    return prm == 1.0
+
+
+def _check_size_name(name: str) -> None:
+    keys = [*size_keys(name), *(key for key in NUMERICS if key in name)]
+    if len(keys) > 1:
+        raise ModelError(f"numeric '{name}' must contain only one of these in its name: {listed(keys)}")
 
 
 def _at_most_one(model: mujoco.MjModel, kind: mujoco.mjtObj, items: list[int]) -> None:

@@ -1,15 +1,19 @@
-"""The still part of a recording: every geom of a MuJoCo model as a rerun shape, and where muscles attach."""
+"""The still part of a recording: every geom of a MuJoCo model, and every wrapping surface, as a rerun shape."""
 
 from typing import Any
 
 import numpy as np
 import rerun as rr
 
+from mjwrap.meshes import surface_grid, triangles
+from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
+
 # mjtGeom; only mjcf, system and plugin know mujoco itself
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
 
 DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
 WRAP_ALPHA = 0.35
+SMOOTH = 49  # points on the circles of a surface
 FLOOR_ALPHA = 0.15  # a plane without its texture would outshine everything
 
 
@@ -50,6 +54,25 @@ def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
         faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]
         return _mesh(vertices, faces, rgba)
     return None
+
+
+def draws(model: Any, geom: int, surface: Surface) -> bool:
+    """Whether a geom is drawn as a surface looks, but for the ends of a cylinder without any."""
+    kind, size = int(model.geom_type[geom]), tuple(float(x) for x in model.geom_size[geom])
+    if isinstance(surface, Cylinder):
+        return kind == CYLINDER and surface.radius == size[0] and surface.half_length in (size[1], np.inf)
+    if isinstance(surface, Sphere):
+        return kind == SPHERE and surface.radius == size[0]
+    if isinstance(surface, Ellipsoid):
+        return kind == ELLIPSOID and surface.radii == size
+    return isinstance(surface, Capsule) and kind == CAPSULE and surface.dims == size[:2]
+
+
+def surface_shape(model: Any, geom: int, surface: Surface) -> rr.AsComponents:
+    """A surface in the frame of the geom that carries it, in the geom's colour, translucent however the geom looks."""
+    rgba = _rgba(model, geom)
+    rgba[3] = WRAP_ALPHA
+    return _mesh(*triangles(surface_grid(surface, SMOOTH, SMOOTH)), rgba)
 
 
 def pose(position: np.ndarray, quaternion: np.ndarray) -> rr.Transform3D:

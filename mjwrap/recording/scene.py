@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 
 from mjwrap.recording.columns import QUANTITIES
-from mjwrap.recording.geometry import geom_shape, pose
+from mjwrap.recording.geometry import draws, geom_shape, pose, surface_shape
 from mjwrap.recording.stream import Stream
 
 SITE_COLORS = {"origins": (60, 200, 90), "insertions": (250, 160, 40), "via_points": (235, 235, 235)}
@@ -41,7 +41,16 @@ class Scene:
             f"{self.bodies[model.geom_bodyid[i]]}/{entity('geoms', name)}"
             for i, name in enumerate(geom_names)
         ]
-        self.wrapping = {int(geom) for muscle in self.declarations for geom in muscle.geoms}
+        surfaces = [
+            pair for muscle in self.declarations for pair in zip(muscle.geoms, muscle.surfaces, strict=True)
+        ]
+        self.wrapping = {geom for geom, surface in surfaces if draws(model, geom, surface)}
+        drawn = dict.fromkeys(pair for pair in surfaces if not draws(model, *pair))
+        named = _distinct([geom_names[geom] for geom, _ in drawn], "surface")
+        self.surfaces = {
+            f"{self.bodies[model.geom_bodyid[geom]]}/{entity('surfaces', name)}": (geom, surface)
+            for (geom, surface), name in zip(drawn, named, strict=True)
+        }
         self.hidden = [
             self.geoms[i]
             for i in range(model.ngeom)
@@ -60,6 +69,9 @@ class Scene:
             shape = geom_shape(model, geom, wraps=geom in self.wrapping)
             if shape is not None:
                 stream.static(path, shape, pose(model.geom_pos[geom], model.geom_quat[geom]))
+        for path, (geom, surface) in self.surfaces.items():
+            shape = surface_shape(model, geom, surface)
+            stream.static(path, shape, pose(model.geom_pos[geom], model.geom_quat[geom]))
         for path, points in self._site_points().items():
             stream.static(path, points)
         line = rr.LineStrips3D.from_fields(radii=self._radius(2.0))

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 
 from mjwrap.errors import StateError
-from mjwrap.kernels import readiness
+from mjwrap.kernels import readiness, shape
 from mjwrap.mjcf import MuscleDeclaration, name_of
+from mjwrap.plan import kernel_rows
 
 _BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
 _BADQVEL = int(mujoco.mjtWarning.mjWARN_BADQVEL)
@@ -21,7 +22,7 @@ def resets(data: mujoco.MjData) -> int:
 
 
 def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> str:
-    """Return which sites of a muscle lie inside the geoms next to them at the given poses, or an empty string."""
+    """Return which sites of a muscle lie inside the surfaces next to them at the given poses, or an empty string."""
     found = []
     for route in muscle.routes:
         stops = [route.origin, *(node.site for node in route.nodes), route.insertion]
@@ -36,8 +37,7 @@ def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDecla
                 local = poses.geom_xmat[node.geom].reshape(3, 3).T @ (
                     poses.site_xpos[site] - poses.geom_xpos[node.geom]
                 )
-                flat = int(model.geom_type[node.geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-                if np.linalg.norm(local[:2] if flat else local) < model.geom_size[node.geom, 0]:
+                if shape.height(np.array(kernel_rows(node)), 0, *local.tolist()) < 0.0:
                     inner = name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
                     outer = name_of(model, mujoco.mjtObj.mjOBJ_GEOM, node.geom)
                     found.append(f"site '{inner}' is inside geom '{outer}'")

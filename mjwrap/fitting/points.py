@@ -1,0 +1,73 @@
+"""Points to fit a surface to: vertices of a mesh geom, in a part of space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from mjwrap.errors import GeometryError, ModelError
+
+Array = NDArray[np.float64]
+Region = Callable[[Array], ArrayLike]
+_MESH = 7  # mjtGeom; only mjcf, system and plugin know mujoco itself
+
+
+def mesh_points(model: Any, geom: str | int, region: Region | None = None, data: Any = None) -> Array:
+    """Return the vertices (m, 3) of a mesh geom [m], in the frame of its body or, with `data`, in the world.
+
+    model, data: mujoco's MjModel and MjData, its kinematics up to date; geom: name or id; region: a function of points
+    (m, 3) that says which to keep (m,), such as `in_box`, `in_ball` or `beyond` make. Raises `ModelError` for a geom
+    that does not exist or is no mesh, with the names of those that are.
+    """
+    index = _mesh_geom(model, geom)
+    mesh = int(model.geom_dataid[index])
+    first = int(model.mesh_vertadr[mesh])
+    vertices = np.asarray(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], dtype=np.float64)
+    if data is None:
+        rotation = Rotation.from_quat(np.roll(model.geom_quat[index], -1)).as_matrix()
+        origin = model.geom_pos[index]
+    else:
+        rotation, origin = data.geom_xmat[index].reshape(3, 3), data.geom_xpos[index]
+    points = np.unique(vertices, axis=0) @ rotation.T + origin
+    return points if region is None else points[np.asarray(region(points), dtype=bool)]
+
+
+def in_box(low: ArrayLike, high: ArrayLike) -> Region:
+    """Return a region: a box along the axes from corner low (3,) to corner high (3,) [m]."""
+    a, b = _vector(low, "low"), _vector(high, "high")
+    return lambda points: np.all((points >= a) & (points <= b), axis=1)
+
+
+def in_ball(centre: ArrayLike, radius: float) -> Region:
+    """Return a region: all points within radius [m] of a centre (3,) [m]."""
+    middle = _vector(centre, "centre")
+    return lambda points: np.linalg.norm(points - middle, axis=1) <= radius
+
+
+def beyond(point: ArrayLike, direction: ArrayLike) -> Region:
+    """Return a region: the half space of all points that lie beyond a point (3,) [m] in a direction (3,)."""
+    start, along = _vector(point, "point"), _vector(direction, "direction")
+    return lambda points: (points - start) @ along >= 0.0
+
+
+def _vector(value: ArrayLike, what: str) -> Array:
+    vector = np.asarray(value, dtype=np.float64)
+    if vector.shape != (3,) or np.isnan(vector).any():
+        raise GeometryError(f"region: {what} must be 3 numbers [m], not {value!r}")
+    return vector
+
+
+def _mesh_geom(model: Any, geom: str | int) -> int:
+    names = [model.geom(i).name or f"#{i}" for i in range(model.ngeom)]
+    meshes = [i for i in range(model.ngeom) if int(model.geom_type[i]) == _MESH]
+    index = names.index(geom) if isinstance(geom, str) and geom in names else geom
+    if not isinstance(index, str) and int(index) in meshes:
+        return int(index)
+    there = ", ".join(names[i] for i in meshes) or "none"
+    exists = not isinstance(index, str) and 0 <= int(index) < model.ngeom
+    fault = "is no mesh" if exists else "does not exist"
+    raise ModelError(f"geom {geom!r} {fault}; mesh geoms: {there}")
