@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import branched
@@ -15,8 +13,12 @@ from mjwrap.kernels.ruled import TWO_PI
 
 KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
-W_P, W_Q, W_L, W_LQ = lay.W_P, lay.W_Q, lay.W_L, lay.W_LQ
+W_P, W_Q, W_OLD = lay.W_P, lay.W_Q, lay.W_OLD
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
+LEAST_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
+MOST_FLIPS = 3
+WINDOW = 4
+SWEEPS = 4
 SEARCH_EVERY = 6  # passes: a search costs as much as fifty wraps
 
 
@@ -79,31 +81,67 @@ def path_length(lo, hi, ends, node):
 
 
 @jit
-def shorten(lo, hi, ends, node, passes):
-    """Try the other side of every cylinder without a hint and keep what is shorter; return the evaluations spent.
+def _flipped(k, node):
+    """Return whether obstacle k may be passed on its other side: it is touched, no hint says where, and it is passed
+    by so much that the other way can be shorter."""
+    if not branched(node[k, KIND]) or node[k, HINT] > 0.0 or node[k, S_MODE] != TOUCHED or node[k, lay.TWIN] > 0.0:
+        return False
+    return abs(node[k, S_SWEEP]) >= LEAST_SWEEP
 
-    A greedy search from the sides on which the straight string passes. It runs at cold starts only.
+
+@jit
+def _keep(lo, hi, node, out, back):
+    """Copy the saved solutions of lo..hi to the columns `out`, or back from there."""
+    for j in range(lo, hi):
+        for i in range(lay.STATE):
+            if back:
+                node[j, S_MODE + i] = node[j, out + i]
+            else:
+                node[j, out + i] = node[j, S_MODE + i]
+
+
+@jit
+def _between(lo, hi, first, last, ends, node):
+    """Return the ends of the part first..last of the path over lo..hi, from the contacts on both sides of it."""
+    ax, ay, az = ends[3], ends[4], ends[5]
+    for j in range(first - 1, lo - 1, -1):
+        if node[j, S_MODE] == TOUCHED:
+            ax, ay, az = node[j, W_Q], node[j, W_Q + 1], node[j, W_Q + 2]
+            break
+    bx, by, bz = _following(last - 1, hi, ends, node)
+    return (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
+
+
+@jit
+def shorten(lo, hi, ends, node, passes):
+    """Try the other sides of all surfaces with a topological side and no hint; keep what is shorter.
+
+    Runs of up to MOST_FLIPS neighbours change sides together, with the path WINDOW obstacles to both sides of them free to
+    follow; until nothing gets shorter. A local search, at cold starts only. Returns the evaluations spent.
     """
     spent = 0
-    saved = np.empty((hi - lo, lay.STATE))
-    best = path_length(lo, hi, ends, node)
-    for k in range(lo, hi):
-        if not branched(node[k, KIND]) or node[k, HINT] > 0.0 or node[k, S_MODE] != TOUCHED:
-            continue
-        if abs(node[k, S_SWEEP]) < 0.5 * math.pi:
-            continue
-        for j in range(lo, hi):
-            for i in range(lay.STATE):
-                saved[j - lo, i] = node[j, S_MODE + i]
-        node[k, S_SWEEP] -= math.copysign(TWO_PI, node[k, S_SWEEP])
+    for _ in range(SWEEPS):
+        shorter = False
+        for run in range(1, MOST_FLIPS + 1):
+            for k in range(lo, hi - run + 1):
+                if not (_flipped(k, node) and _flipped(k + run - 1, node)):
+                    continue
+                first, last = max(lo, k - WINDOW), min(hi, k + run + WINDOW)
+                part = _between(lo, hi, first, last, ends, node)
+                before = path_length(first, last, part, node)
+                _keep(first, last, node, W_OLD, False)
+                for j in range(k, k + run):
+                    if _flipped(j, node):
+                        node[j, S_SWEEP] -= math.copysign(TWO_PI, node[j, S_SWEEP])
+                spent += relax(first, last, part, node, passes)
+                if path_length(first, last, part, node) < before * (1.0 - 1e-9):
+                    shorter = True
+                    continue
+                _keep(first, last, node, W_OLD, True)
+                for j in range(first, last):
+                    if node[j, S_MODE] == TOUCHED:
+                        geodesic(j, node, ends[0], ends[1], ends[2])
+        if not shorter:
+            break
         spent += relax(lo, hi, ends, node, passes)
-        trial = path_length(lo, hi, ends, node)
-        if trial < best * (1.0 - 1e-9):
-            best = trial
-        else:
-            for j in range(lo, hi):
-                for i in range(lay.STATE):
-                    node[j, S_MODE + i] = saved[j - lo, i]
-                if node[j, S_MODE] == TOUCHED:
-                    geodesic(j, node, ends[0], ends[1], ends[2])
     return spent

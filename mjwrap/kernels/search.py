@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import carray
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import minimal, swept
 from mjwrap.kernels.clearance import bounding_radius, dip, tube_angle, tube_crossing
+from mjwrap.kernels.frames import unit
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.ruled import A_INSIDE, B_INSIDE, INSIDE, follow, set_free
 from mjwrap.kernels.shape import height, into_frame, project, turn_into_frame
@@ -30,13 +32,15 @@ W_P, W_Q = lay.W_P, lay.W_Q
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 
 DIRECTIONS = 8  # half planes around AB
-COLUMNS = 24  # samples of a section's upper boundary
+COLUMNS = 18  # samples of a section's upper boundary
+EVEN = 1e-4  # to which a section's boundary is found, in the surface's size
 LIFTS = 3  # corrections where the way over a section meets more of it
 BRIDGE = 0.1  # a string that stands off the surface so high, in its size, between two columns bridges a hollow
 MARCH = 60  # steps to a section's boundary
-LOCAL_TOL = 1e-9  # tangency error of a single wrap
+LOCAL_TOL = 1e-5  # tangency error of a single wrap: all of them are polished together
 LOCAL_STEPS = 15
 DEPTH = 1e-10  # a segment that dips less below a surface, in its size, is clear of it
+GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # of an arc of an ellipse, for a guess
 SAME_BRANCH = 1.0  # difference of swept angles [rad] that is no whole turn
 
 
@@ -54,12 +58,18 @@ def _climb(node, k, x, y, z, wx, wy, wz, start):
             break
         lo = hi
         step *= 1.2
-    for _ in range(12):
-        middle = 0.5 * (lo + hi)
-        if height(node, k, x + middle * wx, y + middle * wy, z + middle * wz) >= 0.0:
-            hi = middle
+    low = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
+    for _ in range(8):  # regula falsi, the Illinois way
+        if h <= EVEN * node[k, SIZE]:
+            break
+        middle = (lo * h - hi * low) / (h - low)
+        g = height(node, k, x + middle * wx, y + middle * wy, z + middle * wz)
+        if g >= 0.0:
+            hi, h = middle, g
+            low *= 0.5
         else:
-            lo = middle
+            lo, low = middle, g
+            h *= 0.5
     return hi
 
 
@@ -127,11 +137,54 @@ def _over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step
 
 
 @jit
+def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
+    """Do what `_guess` does in closed form: in the image in which the ellipsoid is a sphere the section is a circle."""
+    a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
+    px, py, pz = ax / a, ay / b, az / c
+    dx, dy, dz = size * ux / a, size * uy / b, size * uz / c
+    vx, vy, vz = wx / a, wy / b, wz / c
+    inverse = 1.0 / (dx * dx + dy * dy + dz * dz)
+    along = (vx * dx + vy * dy + vz * dz) * inverse
+    vx, vy, vz = unit(vx - along * dx, vy - along * dy, vz - along * dz)  # at right angles to AB in the plane
+    scale = math.sqrt(inverse)
+    dx, dy, dz = dx * scale, dy * scale, dz * scale
+    x, y = -(px * dx + py * dy + pz * dz), -(px * vx + py * vy + pz * vz)  # the centre, seen from A
+    square = 1.0 - max(px * px + py * py + pz * pz - x * x - y * y, 0.0)
+    if square <= 0.0:
+        return False
+    radius, far = math.sqrt(square), 1.0 / scale  # of the circle; distance of A and B
+    root_a = math.sqrt(max(x * x + y * y - square, 0.0))
+    root_b = math.sqrt(max((far - x) ** 2 + y * y - square, 0.0))
+    # directions of the normals at P and Q, as angles: tangents from A and B that pass over the circle
+    start = math.atan2(-y, -x) - math.atan2(root_a, radius)
+    stop = math.atan2(-y, far - x) + math.atan2(root_b, radius)
+    arc = start - stop
+    if arc > math.pi * 1.5:
+        arc -= 2.0 * math.pi
+    elif arc < -math.pi * 0.5:
+        arc += 2.0 * math.pi
+    arc = max(arc, 0.0)
+    total = 0.0
+    for i in range(GAUSS.shape[0]):
+        g = start - 0.5 * arc * (1.0 + GAUSS[i])
+        f, e = math.sin(g), -math.cos(g)
+        total += GAUSS_WEIGHTS[i] * math.sqrt(
+            (a * (f * dx + e * vx)) ** 2 + (b * (f * dy + e * vy)) ** 2 + (c * (f * dz + e * vz)) ** 2
+        )
+    x, y = x + radius * math.cos(start), y + radius * math.sin(start)
+    tx, ty, tz = a * (x * dx + y * vx), b * (x * dy + y * vy), c * (x * dz + y * vz)
+    _place(k, node, ax + tx, ay + ty, az + tz, tx, ty, tz, 0.5 * arc * radius * total)
+    return True
+
+
+@jit
 def _guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
     """Write a first guess for the string over the section with the half plane towards w; return whether there is one.
 
     u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest.
     """
+    if node[k, KIND] == lay.ELLIPSOID:
+        return _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size)
     memory = carray(stack(), (80,))
     top, chain = memory[0:COLUMNS], memory[COLUMNS : 2 * COLUMNS]
     lo, hi = 0.0, size

@@ -12,7 +12,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.certify import minimal, slip
+from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import holds
 from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.newton import newton
@@ -29,7 +29,7 @@ MAX_ROUNDS = 50  # changes of the set of touched obstacles, repairs included
 MAX_REPAIRS = 4
 COLD_PASSES = 3  # of obstacle-by-obstacle wrapping before Newton's method is tried
 REPAIR_PASSES = 7  # the first repair; further ones take about twice as many each
-AFRESH = 2  # repairs after which a cold start forgets its hints
+AFRESH = 2  # repairs after which the search begins anew
 KICK = 0.3  # off a saddle, in radii
 CALM = 4  # changes of the set of touched obstacles, beyond one for each, that count as going round in circles
 
@@ -60,11 +60,15 @@ def _restore(lo, hi, ends, node):
 
 
 @jit
-def _start_afresh(lo, hi, node):
-    """Forget what was found and ignore the hints: they may ask for a side on which no string holds."""
+def _start_afresh(lo, hi, cold, node):
+    """Forget what was found and ignore the hints: they may ask for a side on which no string holds.
+
+    A warm start keeps its topological sides; what it loses is a minimum that has ceased to exist.
+    """
     for k in range(lo, hi):
-        node[k, S_MODE] = COLD
-        node[k, HINT] = -abs(node[k, HINT])
+        if cold or not branched(node[k, lay.KIND]):
+            node[k, S_MODE] = COLD
+            node[k, HINT] = -abs(node[k, HINT])
 
 
 @jit
@@ -154,8 +158,8 @@ def _solve(lo, hi, ends, node, tol, direct):
         saddle = good and changes == 0
         if repairs == 0 and not saddle:
             _restore(lo, hi, ends, node)
-        if cold and repairs == AFRESH:
-            _start_afresh(lo, hi, node)
+        if repairs == AFRESH:
+            _start_afresh(lo, hi, cold, node)
         elif saddle:
             _slip_off(lo, hi, node, 1.0 if repairs % 2 == 0 else -1.0)
         passes = (REPAIR_PASSES + repairs) << repairs if hi - lo > 1 else 1

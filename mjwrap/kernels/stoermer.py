@@ -9,6 +9,7 @@ write the rule out with their own f; lanes 0..3 are done after four rounds.
 
 from __future__ import annotations
 
+import collections
 import ctypes
 from typing import Any
 
@@ -41,10 +42,12 @@ SHRINK = 1.0 / 15.0  # power by which a rejected step shrinks
 MAX_STEPS = 200  # of one geodesic, rejected ones included
 
 if config.DISABLE_JIT:
+    _recent: collections.deque[Any] = collections.deque(maxlen=64)  # `carray` does not hold its memory
 
     def stack() -> Any:
-        """Return a pointer to ROWS x LANES doubles."""
+        """Return a pointer to ROWS x LANES doubles, which live until 64 more have been asked for."""
         memory = (ctypes.c_double * (ROWS * LANES))()
+        _recent.append(memory)
         return ctypes.cast(memory, ctypes.POINTER(ctypes.c_double))
 
 else:
