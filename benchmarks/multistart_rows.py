@@ -1,8 +1,9 @@
 """Taut paths over a row of surfaces: strings laid round them in many ways, pulled tight all at once, then polished.
 
-A string is a polyline with NODES nodes from one obstacle to the next. It is laid through one waypoint beside each obstacle
-(either side of long ones, several directions round others, a torus' hole, or none), smoothed by an implicit step of its own
-tension and pushed out of the surfaces, over and over. Where its nodes touch at the end is a rough path for `polish`.
+A string is a polyline with NODES nodes from one obstacle to the next. It is laid through one waypoint beside
+each obstacle (either side of long ones, several directions round others, a torus' hole, or none), smoothed by
+an implicit step of its own tension and pushed out of the surfaces, over and over. Where its nodes touch at the
+end is a rough path for `polish`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,7 @@ import mjwrap as mw
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from certificate import ENTERING, Case, deepest, rotation
 from polish import Touch, polish
-from shapes import SHAPES, Array, Ellipsoid, Shape, Torus, dot, sizes, unit
+from shapes import SHAPES, Array, Ellipsoid, Ints, Shape, Torus, beside, dot, sizes, unit
 
 NODES = 10  # from one obstacle to the next
 PULLS = (
@@ -36,8 +38,8 @@ REPAIRS = 3  # rounds of taking in what a polished path enters
 SAME = 1e-3  # relative: strings whose lengths differ by less and that touch alike are one
 
 
-def ways_round(surface: mw.Surface, quat: Sequence[float], along: Array) -> list[Array | None]:
-    """Return waypoints beside a surface, relative to its centre, for a string that runs along a unit vector; None: straight."""
+def ways_round(surface: mw.Surface, quat: Sequence[float], along: Array) -> list[Array]:
+    """Return waypoints beside a surface, relative to its centre, for a string that runs along a unit vector."""
     turn, d = rotation(quat), sizes(surface)
     match surface:
         case mw.Cylinder() | mw.Cone() | mw.EllipticCylinder():
@@ -50,7 +52,7 @@ def ways_round(surface: mw.Surface, quat: Sequence[float], along: Array) -> list
             reach, count, others = d[0] + d[1], 4, []
         case _:
             reach, count, others = 1.2 * max(d), 4, []
-    first = unit(np.cross(along, np.eye(3)[np.abs(along).argmin()]))
+    first = beside(along)
     second = np.cross(along, first)
     angles = 2.0 * np.pi * (np.arange(count) + 0.25) / count
     return [*others, *(reach * (np.cos(x) * first + np.sin(x) * second) for x in angles)]
@@ -86,7 +88,7 @@ class _Pushers:
     """The surfaces of a row by kind, and the nodes that each may push."""
 
     def __init__(self, obstacles: Sequence[mw.Obstacle], nodes: int) -> None:
-        self.groups: list[tuple[Shape, list[int], Array, Array, Array, Array]] = []
+        self.groups: list[tuple[Shape, list[int], Array, Array, Array, Ints]] = []
         kinds = [type(o.surface) for o in obstacles]
         for kind in dict.fromkeys(kinds):
             rows = [k for k, other in enumerate(kinds) if other is kind]
@@ -109,7 +111,7 @@ class _Pushers:
                 np.einsum("hij,hj->hi", turn[k], _pushed(shape, d[k], local[m, k, n])) + pos[k]
             )
 
-    def touching(self, string: Array) -> list[tuple[int, Array]]:
+    def touching(self, string: Array) -> list[tuple[int, Ints]]:
         """Return for each touched obstacle its nodes, in order of the obstacles."""
         found = []
         for shape, rows, d, turn, pos, window in self.groups:
@@ -120,7 +122,7 @@ class _Pushers:
 
 
 def _pushed(shape: Shape, d: Array, x: Array) -> Array:
-    """Return points inside a surface moved out to it: along the normal, from deep inside an ellipsoid along the radius."""
+    """Return points inside a surface moved out: along the normal, deep inside an ellipsoid along the radius."""
     if not isinstance(shape, Ellipsoid):
         # a point on an axis has no way out: any will do
         nudged = x + 1e-9 * np.array([0.7, 0.5, 0.3])
@@ -154,7 +156,7 @@ def pulled_tight(strings: Array, pushers: _Pushers) -> Array:
 
 
 def rough_path(string: Array, obstacles: Sequence[mw.Obstacle], pushers: _Pushers) -> list[Touch]:
-    """Return the touches of a string that is pulled tight: one for each surface, or two where it bridges a torus' hollow."""
+    """Return the touches of a string that is pulled tight: one for each surface, two where it bridges a hollow."""
     touches = []
     gaps = np.linalg.norm(np.diff(string, axis=0), axis=1)
     for k, nodes in pushers.touching(string):
@@ -178,7 +180,7 @@ def repaired(
     ends = [(0, origin, origin, 0.0), *stops, (len(obstacles) - 1, insertion, insertion, 0.0)]
     touches: list[Touch] = []
     entered = False
-    for place, ((i, _, point, _), (k, far, _, s)) in enumerate(zip(ends, ends[1:], strict=False)):
+    for place, ((i, _, point, _), (k, far, _, s)) in enumerate(pairwise(ends)):
         for j in range(i, k + 1):
             if len(case.contacts[j]) > (1 if isinstance(obstacles[j].surface, mw.Torus) else 0):
                 continue

@@ -1,17 +1,18 @@
 """Every taut path over one surface: closed forms where it unrolls or is round, else rays shot from one end point.
 
-A path over one surface starts along a ray from the origin that grazes the surface. Those rays are a family with one parameter: a
-hundred of them are taken, each is continued along its geodesic, and along each geodesic the places are found at which the
-insertion lies in the surface's tangent plane straight ahead. Where the sideways miss changes sign from ray to ray there is a path.
+A path over one surface starts along a ray from the origin that grazes the surface. Those rays are a family with
+one parameter: a hundred of them are taken, each is continued along its geodesic, and along each geodesic the
+places are found at which the insertion lies in the surface's tangent plane straight ahead. Where the sideways
+miss changes sign from ray to ray there is a path.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ellipeinc
 
 import mjwrap as mw
@@ -20,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from arcs import arcs_of
 from certificate import Case, deepest, rotation
 from polish import Touch, polish
-from shapes import SHAPES, Array, Capsule, Ellipsoid, Shape, Torus, dot, sizes, unit
+from shapes import SHAPES, Array, Capsule, Ellipsoid, Ints, Shape, Torus, beside, dot, sizes, unit
 
 RAYS = 64
 TORUS_RAYS = 96  # on each of the two sides of the tube
@@ -214,7 +215,7 @@ def _polar_circle(a: Array, radius: float, ring: Array) -> Array:
     """Return the circle on which rays from a graze the sphere about the origin."""
     far = np.linalg.norm(a)
     up = a / far
-    side = unit(np.cross(up, np.eye(3)[np.abs(up).argmin()]))
+    side = beside(up)
     plane = ring @ np.stack([side, np.cross(up, side)])
     return radius**2 / far * up + radius * np.sqrt(1.0 - (radius / far) ** 2) * plane
 
@@ -241,7 +242,7 @@ def _shot(surface: mw.Surface, a: Array, b: Array) -> list[tuple]:
 
 
 def _followed(shape: Shape, d: Array, P: Array, t: Array) -> tuple[Array, Array, Array]:
-    """Return points and tangents (m, k, 3) of geodesics at arc lengths x (m, k), NaN from where a string would leave them.
+    """Return points and tangents (m, k, 3) of geodesics at arc lengths x (m, k), NaN where a string is gone from them.
 
     That is where the surface bends away from it, behind a conjugate point, or after one and a half half turns.
     """
@@ -274,7 +275,7 @@ def _followed(shape: Shape, d: Array, P: Array, t: Array) -> tuple[Array, Array,
 
 
 def _roots(
-    rows: Array, x: Array, rise: Array, sideways: Array, crossing: Array, curve: Array, t: Array
+    rows: Ints, x: Array, rise: Array, sideways: Array, crossing: NDArray[np.bool_], curve: Array, t: Array
 ) -> list[tuple]:
     """Return touches between neighbouring rays at whose crossings the insertion lies on different sides."""
     hits: dict[int, list[tuple[float, float]]] = {}
@@ -282,7 +283,7 @@ def _roots(
         share = -rise[i, j] / (rise[i, j + 1] - rise[i, j])
         s = x[i, j] + share * (x[i, j + 1] - x[i, j])
         miss = sideways[i, j] + share * (sideways[i, j + 1] - sideways[i, j])
-        hits.setdefault(int(rows[i]), []).append((s, miss))
+        hits.setdefault(int(rows[i]), []).append((float(s), float(miss)))
     found = []
     for i, here in hits.items():
         for s, miss in here:

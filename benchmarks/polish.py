@@ -1,7 +1,8 @@
 """Newton's method on the tangency conditions of rough paths, for the search that judges the solver; none of its code.
 
-A rough path is a list of touches (obstacle, P, t, s). Derivatives are differences of `arcs`' geodesics, so that nothing here
-rests on the analytic Jacobian that the solver uses. All touches of all rough paths of a scene move together.
+A rough path is a list of touches (obstacle, P, t, s). Derivatives are differences of `arcs`' geodesics, so that
+nothing here rests on the analytic Jacobian that the solver uses. All touches of all rough paths of a scene move
+together.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ def polish(
     going = dict.fromkeys(range(len(alive)))
     shorter: dict[int, list[Touch]] = {}
     for _ in range(ITERATIONS):
-        P, nP, bP, Q, tQ, nQ, bQ = touches.frames(by)
+        P, nP, bP, Q, _, nQ, bQ = touches.frames(by)
         left = np.where(inner_before[:, None], Q[before, 0], origin)
         right = np.where(inner_after[:, None], P[after, 0], insertion)
         arrive, leave = _rows(left[:, None], P, nP, bP), _rows(Q, right[:, None], nQ, bQ)

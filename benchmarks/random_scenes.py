@@ -1,8 +1,9 @@
 """Seeded random scenes at muscle scale for robustness.py and motion.py, each with a hint of every kind.
 
-Half of them are made backwards: a geodesic that a string can lie on is drawn first, on every surface in turn, and the ends are put
-on its tangents. So one taut path is known in advance, its middle is a good hint, and its length bounds the shortest. The other
-half are placed at random (`tests/scenes.py`), as obstacles happen to lie, and have no good hint.
+Half of them are made backwards: a geodesic that a string can lie on is drawn first, on every surface in turn,
+and the ends are put on its tangents. So one taut path is known in advance, its middle is a good hint, and its
+length bounds the shortest. The other half are placed at random (`tests/scenes.py`), as obstacles happen to lie,
+and have no good hint.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ STEADY = 0.1  # smallest stiffness left behind a geodesic of a chain, relative t
 class Scene:
     """One scene: obstacles without hints, and what is known of it.
 
-    good, random: a hint for each obstacle, in its frame [m] (good ones None where no path is known); known: the path that
-    the scene was made for, or None.
+    good, random: a hint for each obstacle, in its frame [m] (good ones None where no path is known); known: the path
+    that the scene was made for, or None.
     """
 
     origin: Array
@@ -89,7 +90,7 @@ class Drawn:
 
 @dataclass
 class Link:
-    """One surface of a chain, in the world: where the string touches it, where it heads, and how steadily it is held."""
+    """One surface of a chain, in the world: where the string touches it, where it heads, how steadily it is held."""
 
     drawn: Drawn
     obstacle: mw.Obstacle
@@ -101,7 +102,7 @@ class Link:
 
 
 def draw_geodesics(rng: np.random.Generator, letter: str, count: int, turn: float = MOST_TURN) -> list[Drawn]:
-    """Return geodesics over which a string can be pulled: bent towards the surface everywhere, in range, no conjugate point."""
+    """Return geodesics over which a string can be pulled: bent towards the surface, in range, no conjugate point."""
     found: list[Drawn] = []
     while len(found) < count:
         surfaces = [random_surface(rng, letter) for _ in range(count)]

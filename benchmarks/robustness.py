@@ -1,10 +1,11 @@
 """Cold starts over seeded random scenes: how many converge, is every claim true, is a path without hints the shortest?
 
-Scenes at muscle scale of every surface alone and of rows of 3, 5, 16 and 64 (`random_scenes.py`), each solved with good hints,
-with random ones and with none. Every converged answer is judged again, from its contact points alone, by `tests/certificate.py`. Answers
-without hints are compared with every other path known for the scene: the one that it was made for, the certified answers with
-hints, and, for the first --multistart scenes of a class, the shortest that an independent search finds (`multistart.py`).
-Whatever does not converge, is refuted or is longer can be saved and replayed. The exit status is 1 if a claim is refuted.
+Scenes at muscle scale of every surface alone and of rows of 3, 5, 16 and 64 (`random_scenes.py`), each solved
+with good hints, with random ones and with none. Every converged answer is judged again, from its contact points
+alone, by `tests/certificate.py`. Answers without hints are compared with every other path known for the scene:
+the one that it was made for, the certified answers with hints, and, for the first --multistart scenes of a
+class, the shortest that an independent search finds (`multistart.py`). Whatever does not converge, is refuted
+or is longer can be saved and replayed. The exit status is 1 if a claim is refuted.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # matrices here are small: more threads only fight each other
 
 import argparse
-import collections
 import json
 import math
 import multiprocessing
@@ -22,9 +22,8 @@ import sys
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -36,68 +35,10 @@ from cases import describe, plain, replay
 from certificate import Case, findings
 from multistart import SHORTER, shortest
 from random_scenes import CLASSES, Maker, Scene
+from robustness_table import NOTES, PEERS, REFUSALS, Tally, table
 
 HINTS = ("good", "random", "none")
-REFUSALS = ("OUT_OF_RANGE", "NO_GEODESIC")  # no path of that kind exists, says the solver
 CHUNK = {1: 100, 3: 100, 5: 100, 16: 40, 64: 20}  # scenes made from one pool
-PEERS = (
-    "CableSpan (C++, measured once on the same machine): of cold starts on mixed scenes 8 to 10 % do not converge, and nothing\n"
-    "says so; folded paths, a longest path over a sphere (0.33915 m for a minimum of 0.30562 m) and a path of 28,792 m round\n"
-    "a cylinder of 0.036 m count as converged; end points inside a surface throw."
-)
-
-
-@dataclass
-class Tally:
-    """What happened in the scenes of one class with one kind of hints."""
-
-    scenes: int = 0
-    status: collections.Counter[str] = field(default_factory=collections.Counter)
-    exceptions: int = 0
-    not_finite: int = 0
-    refuted: int = 0
-    folded: int = 0
-    penetrating: int = 0
-    compared: int = 0
-    searched: int = 0
-    longer: int = 0
-    refused_wrongly: int = 0
-    evaluations: list[int] = field(default_factory=list)
-    microseconds: list[float] = field(default_factory=list)
-
-    def add(self, other: Tally) -> None:
-        """Add the counts of another tally of the same class."""
-        for name, value in vars(other).items():
-            setattr(self, name, getattr(self, name) + value)
-
-    @property
-    def lost(self) -> int:
-        """Scenes that ended without a path, those left out in which the solver says that there is none."""
-        found = self.status["CONVERGED"] + sum(self.status[name] for name in REFUSALS)
-        return self.scenes - found
-
-    @property
-    def wrong(self) -> int:
-        """Claims that are not true."""
-        return self.refuted + self.exceptions + self.not_finite
-
-    def numbers(self) -> dict[str, Any]:
-        """Return what is printed and saved."""
-        return {
-            "scenes": self.scenes,
-            **{
-                name: getattr(self, name)
-                for name in ("exceptions", "not_finite", "refuted", "folded", "penetrating")
-            },
-            "status": dict(self.status),
-            "not_converged": self.lost,
-            "refused": sum(self.status[name] for name in REFUSALS),
-            **{name: getattr(self, name) for name in ("refused_wrongly", "longer", "compared", "searched")},
-            "evaluations_median": float(np.median(self.evaluations)) if self.evaluations else math.nan,
-            "evaluations_most": max(self.evaluations, default=0),
-            "us_median": float(np.median(self.microseconds)) if self.microseconds else math.nan,
-            "us_p95": float(np.percentile(self.microseconds, 95)) if self.microseconds else math.nan,
-        }
 
 
 @dataclass
@@ -221,67 +162,6 @@ def _compared(answer: Answer, best: Case | None, kind: str, tally: Tally) -> str
             tally.longer += 1
             return f"LONGER by {answer.case.length - best.length:.2e} m"
     return answer.reason
-
-
-# ------------------------------------------------------------------------------------------ printing
-
-COLUMNS = (
-    ("class", "<17"),
-    ("hints", "<6"),
-    ("scenes", ">6"),
-    ("not converged", ">13"),
-    ("no path exists", ">14"),
-    ("refuted", ">7"),
-    ("folded", ">6"),
-    ("penetrating", ">11"),
-    ("raised", ">6"),
-    ("NaN", ">3"),
-    ("longer", ">14"),
-    ("evaluations", ">11"),
-    ("µs", ">13"),
-)
-
-
-def row_of(name: str, hints: str, numbers: dict[str, Any]) -> list[str]:
-    """Return the cells of one line of the table."""
-    lost, scenes = numbers["not_converged"], numbers["scenes"]
-    share = f"{lost} ({100 * lost / scenes:.2g} %)" if lost else "0"
-    refused = str(numbers["refused"])
-    if numbers["refused_wrongly"]:
-        refused += f" ({numbers['refused_wrongly']} do)"
-    longer = f"{numbers['longer']} of {numbers['compared']}" if hints == "none" else "-"
-    return [
-        name,
-        hints,
-        str(scenes),
-        share,
-        refused,
-        *(str(numbers[key]) for key in ("refuted", "folded", "penetrating", "exceptions", "not_finite")),
-        longer,
-        f"{numbers['evaluations_median']:.0f}, {numbers['evaluations_most']}",
-        f"{numbers['us_median']:.0f}, {numbers['us_p95']:.0f}",
-    ]
-
-
-def table(results: dict[str, dict[str, dict]], markdown: bool) -> str:
-    """Return the table of all classes as text, or as Markdown."""
-    rows = [row_of(name, kind, numbers) for name, kinds in results.items() for kind, numbers in kinds.items()]
-    names = [name for name, _ in COLUMNS]
-    if markdown:
-        rule = ["---" if width[0] == "<" else "---:" for _, width in COLUMNS]
-        return "\n".join("| " + " | ".join(cells) + " |" for cells in (names, rule, *rows))
-    lines = [
-        " ".join(f"{cell:{width}}" for cell, (_, width) in zip(cells, COLUMNS, strict=True))
-        for cells in (names, *rows)
-    ]
-    return "\n".join(line.rstrip() for line in lines)
-
-
-NOTES = (
-    "not converged: no path and no reason why there is none; no path exists: OUT_OF_RANGE or NO_GEODESIC (in brackets: a path\n"
-    "is known all the same); longer: without hints, than the shortest of all other paths known for the scene by more than 1e-6;\n"
-    "evaluations (median, most): of all residuals at once; µs (median, 95 %): solve_path with its checks in Python."
-)
 
 
 def arguments() -> argparse.Namespace:

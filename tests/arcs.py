@@ -1,8 +1,8 @@
 """Geodesics of every shape with their Jacobi fields, by other means than the package's.
 
-Closed forms where the surface unrolls or is round; elsewhere Gauss-Legendre collocation of p'' = -(t.Ht / |g|^2) g in
-the embedding space (g, H: gradient and Hessian of the defining function), for a thousand arcs at once. `slow_arc` integrates the
-same equation with SciPy's DOP853, one arc at a time, and judges both.
+Closed forms where the surface unrolls or is round; elsewhere Gauss-Legendre collocation of p'' = -(t.Ht /
+|g|^2) g in the embedding space (g, H: gradient and Hessian of the defining function), for a thousand arcs at
+once. `slow_arc` integrates the same equation with SciPy's DOP853, one arc at a time, and judges both.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from shapes import SHAPES, Array, Capsule, Cone, Cylinder, Ellipsoid, Shape, Sphere, dot, sizes
+from shapes import SHAPES, Array, Capsule, Cone, Cylinder, Ellipsoid, Ints, Shape, Sphere, dot, sizes
 
 import mjwrap as mw
 
 STAGES = 8  # order 16
 TURN = 1.0  # of the direction within one step, at most [rad]
 ITERATIONS = 25  # of the fixed point within one step: what is left shrinks like TURN^k / k!
+HALVINGS = 3  # of the steps where they prove too long
+DRIFT = 1e-12  # of a tangent's length, and of the end from the surface in radii of curvature
 SAMPLES = 17  # points of a closed form at which it is looked at
 
 
@@ -26,8 +29,8 @@ SAMPLES = 17  # points of a closed form at which it is looked at
 class Arcs:
     """Geodesics (m) from P along t over s, in the surface's frame.
 
-    Q, t (m, 3): where they end; jacobi (m, 4): a, a', r, r' at the end (method, section 2); bending (m): smallest normal
-    curvature along them [1/m]; spread (m): smallest r(x) / x along them, positive before the first conjugate point;
+    Q, t (m, 3): where they end; jacobi (m, 4): a, a', r, r' at the end (method, section 2); bending (m): smallest
+    normal curvature along them [1/m]; spread (m): smallest r(x) / x along them, positive before the first conjugate point;
     reach (m): largest |z| [m]; points, tangents (m, k, 3): on the way, at arc lengths x (m, k).
     """
 
@@ -40,6 +43,10 @@ class Arcs:
     points: Array
     tangents: Array
     x: Array
+
+    def of(self, which: NDArray[np.bool_]) -> Arcs:
+        """Return some of the geodesics."""
+        return Arcs(**{name: getattr(self, name)[which] for name in self.__dataclass_fields__})
 
 
 def arcs_of(shape: Shape, d: Array, P: Array, t: Array, s: Array) -> Arcs:
@@ -199,10 +206,19 @@ def _pull(shape: Shape, d: Array, x: Array, v: Array) -> Array:
 def _collocated(shape: Shape, d: Array, P: Array, t: Array, s: Array) -> Arcs:
     """Integrate arcs that need about the same number of steps together."""
     need = np.ceil(np.log2(np.maximum(shape.bend(d) * s / TURN, 1.0))).astype(int)
-    done: list[tuple[Array, Arcs]] = []
-    for power in np.unique(need):
+    most_steps = need + HALVINGS
+    done: list[tuple[Ints, Arcs]] = []
+    while (need >= 0).any():
+        power = need[need >= 0].min()
         group = np.flatnonzero(need == power)
-        done.append((group, _steps(shape, d[group], P[group], t[group], s[group], 2**power)))
+        arcs = _steps(shape, d[group], P[group], t[group], s[group], 2**power)
+        # nothing in the equation holds tangents at length one or points on the surface but accuracy
+        drift = np.maximum(
+            np.abs(dot(arcs.t, arcs.t) - 1.0), np.abs(shape.level(d[group], arcs.Q)) * shape.bend(d[group])
+        )
+        again = (drift > DRIFT) & (need[group] < most_steps[group])
+        need[group] = np.where(again, power + 1, -1)
+        done.append((group[~again], arcs.of(~again)))
     if not done:
         return _steps(shape, d, P, t, s, 1)
     order = np.argsort(np.concatenate([group for group, _ in done]))

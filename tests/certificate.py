@@ -1,19 +1,20 @@
 """The judge of paths: what a solution claims, tested from its contact points and arc lengths alone.
 
-A path of a taut string touches each of its surfaces along a geodesic that bends towards the surface everywhere, meets and
-leaves it tangentially, enters no surface in whose turn it lies, and is a local minimum of length. `findings` tests a thousand
-paths at once, by the geometry of `shapes` and the geodesics of `arcs`.
+A path of a taut string touches each of its surfaces along a geodesic that bends towards the surface everywhere,
+meets and leaves it tangentially, enters no surface in whose turn it lies, and is a local minimum of length.
+`findings` tests a thousand paths at once, by the geometry of `shapes` and the geodesics of `arcs`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from arcs import Arcs, arcs_of
-from shapes import SHAPES, Array, Shape, half_length, sizes, unit
+from shapes import SHAPES, Array, Ints, Shape, beside, half_length, sizes
 
 import mjwrap as mw
 
@@ -51,9 +52,10 @@ class Case:
         contacts: list[Contacts] = []
         for contact in sol.contacts:
             contacts.append([])
-            while contact is not None and contact.active:
-                contacts[-1].append((contact.P, contact.Q, contact.arc_length))
-                contact = contact.second
+            touch: mw.Contact | None = contact
+            while touch is not None and touch.P is not None and touch.Q is not None:
+                contacts[-1].append((touch.P, touch.Q, touch.arc_length))
+                touch = touch.second
         return cls(np.asarray(origin, float), np.asarray(insertion, float), obstacles, contacts, sol.length)
 
 
@@ -126,12 +128,12 @@ def findings(cases: Sequence[Case]) -> list[str]:
         if not np.isfinite(values).all():
             verdict.refute(number, "not finite")
             continue
-        found, chords, total = _laid_out(number, case)
-        if abs(case.length - total) > SUM * total:
-            verdict.refute(number, f"length: {case.length!r} m is not the sum of its parts, {total!r} m")
+        found, chords, total = laid_out(number, case)
         if any(touch.s < 0.0 for touch in found):
             verdict.refute(number, "negative arc length")
             continue
+        if abs(case.length - total) > SUM * total:
+            verdict.refute(number, f"length: {case.length!r} m is not the sum of its parts, {total!r} m")
         touches += found
         segments += chords
     for group in grouped(cases, touches):
@@ -144,14 +146,14 @@ def findings(cases: Sequence[Case]) -> list[str]:
 # ---------------------------------------------------------------------------------- laying a path out
 
 
-def _laid_out(number: int, case: Case) -> tuple[list[Touch], list[tuple[int, int, Array, Array]], float]:
+def laid_out(number: int, case: Case) -> tuple[list[Touch], list[tuple[int, int, Array, Array]], float]:
     """Return the touches of a case, its pairs (case, obstacle, from, to) of segments and surfaces, and its length."""
     stops: list[tuple[int, Array, Array, float]] = [(-1, case.origin, case.origin, 0.0)]
     for k, contacts in enumerate(case.contacts):
         stops += [(k, np.asarray(P), np.asarray(Q), float(s)) for P, Q, s in contacts]
     stops.append((len(case.obstacles), case.insertion, case.insertion, 0.0))
     total, beside, chords = 0.0, [], []
-    for (i, _, a, _), (j, b, _, s) in zip(stops, stops[1:], strict=False):
+    for (i, _, a, _), (j, b, _, s) in pairwise(stops):
         size = float(np.linalg.norm(b - a))
         total += size + s
         beside.append(((b - a) / size if size > 0.0 else np.zeros(3), size))
@@ -165,7 +167,7 @@ def _laid_out(number: int, case: Case) -> tuple[list[Touch], list[tuple[int, int
 
 
 def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
-    """Return the touches by kind of surface, with the geodesic that each arriving segment continues in; fill in the frames."""
+    """Return the touches by kind of surface, with the geodesics that arriving segments continue in; fill in frames."""
     kinds: dict[type, list[Touch]] = {}
     for touch in touches:
         obstacle = cases[touch.case].obstacles[touch.index]
@@ -190,7 +192,7 @@ def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
         e = np.where(blunt[:, None], e2, e)
         t = e - (e * n).sum(1)[:, None] * n
         size = np.linalg.norm(t, axis=1)
-        t = np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], _any_tangent(n))
+        t = np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], beside(n))
         arcs = arcs_of(shape, d, P, t, s)
         ends = shape.normal(d, arcs.Q)
         for k, touch in enumerate(found):
@@ -199,12 +201,6 @@ def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
             touch.jacobi = arcs.jacobi[k]
         groups.append(Group(shape, found, d, turn, P, Q, t, s, arcs))
     return groups
-
-
-def _any_tangent(n: Array) -> Array:
-    """Return some unit tangents to unit normals."""
-    least = np.eye(3)[np.abs(n).argmin(1)]
-    return unit(np.cross(n, least))
 
 
 # ------------------------------------------------------------------------------------------ contacts
@@ -254,7 +250,7 @@ def deepest(shape: Shape, d: Array, a: Array, b: Array) -> Array:
     count = 3 if shape.convex else SEGMENT_SAMPLES
     share = np.linspace(0.0, 1.0, count)
 
-    def level(rows: Array, where: Array) -> Array:
+    def level(rows: Ints, where: Array) -> Array:
         return shape.level(d[rows], a[rows] + where[:, None] * (b - a)[rows])
 
     grid = shape.level(d[:, None], a[:, None] + share[None, :, None] * (b - a)[:, None])

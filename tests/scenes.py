@@ -116,7 +116,7 @@ def _spread_ball() -> Array:
 
 
 def _filled(axes: Array, directions: Array) -> tuple[Array, Array]:
-    """Return the balls that touch an ellipsoid (or ellipse) from inside at points of it: centred in its middle plane."""
+    """Return the balls that touch an ellipsoid (or ellipse) from inside, centred in its middle plane."""
     touch = axes * directions
     centres = touch * (1.0 - axes.min() ** 2 / axes**2)
     return centres, np.linalg.norm(touch - centres, axis=1)
@@ -138,7 +138,7 @@ def _clear(a: mw.Obstacle, b: mw.Obstacle) -> bool:
 
 
 def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) -> mw.Surface:
-    """Return a surface at muscle scale, radii 1 to 5 cm: a letter of LETTERS; largest (0 to 1) limits how big it gets."""
+    """Return a surface at muscle scale, radii 1 to 5 cm: a letter of LETTERS; largest (0 to 1) limits its size."""
 
     def size(low: float, high: float) -> float:
         return float(rng.uniform(low, low + largest * (high - low)))
@@ -173,8 +173,8 @@ def point_towards(surface: mw.Surface, direction: Array) -> Array:
 def random_scene(rng: np.random.Generator, kinds: str, hints: bool) -> tuple[Array, Array, list[mw.Obstacle]]:
     """Return origin, insertion and obstacles in a row at muscle scale, none overlapping.
 
-    kinds: one letter of LETTERS per obstacle. Axes are tilted by about 0.4 rad; ellipsoids, tori and capsules are turned
-    any way. Hints are random points of the surfaces.
+    kinds: one letter of LETTERS per obstacle. Axes are tilted by about 0.4 rad; ellipsoids, tori and capsules are
+    turned any way. Hints are random points of the surfaces.
     """
     while True:
         spacing = rng.uniform(0.06, 0.12)

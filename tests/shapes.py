@@ -1,8 +1,8 @@
 """Geometry of every surface, written without any of the package's kernels: slow, obvious NumPy.
 
-A shape works in the surface's own frame. Its sizes d (..., k) [m] and points x (..., 3) [m] broadcast against each
-other, so that one call serves a thousand surfaces. The shape operator W is that of dn = W dp with the outward normal n:
-a sphere of radius R has W = I / R.
+A shape works in the surface's own frame. Its sizes d (..., k) [m] and points x (..., 3) [m] broadcast against
+each other, so that one call serves a thousand surfaces. The shape operator W is that of dn = W dp with the
+outward normal n: a sphere of radius R has W = I / R.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import mjwrap as mw
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
 FARTHEST = 60  # Newton steps to the nearest point of an ellipse; each at least halves what is missing
 
 
@@ -26,6 +27,13 @@ def dot(a: Array, b: Array) -> Array:
 def unit(a: Array) -> Array:
     """Return the unit vectors of a (..., 3)."""
     return a / np.sqrt(dot(a, a))[..., None]
+
+
+def beside(a: Array) -> Array:
+    """Return some unit vectors at right angles to a (..., 3)."""
+    least = np.eye(3)[np.abs(a).argmin(-1)]
+    cross: Array = np.cross(a, least)
+    return unit(cross)
 
 
 def dyad(a: Array) -> Array:
@@ -44,7 +52,7 @@ class Shape:
         raise NotImplementedError
 
     def level(self, d: Array, x: Array) -> Array:
-        """Return a quick stand-in for the height: same sign, never larger, convex along straight lines if the shape is."""
+        """Return a quick stand-in for the height: same sign, never larger, convex along lines if the shape is."""
         return self.height(d, x)
 
     def gradient(self, d: Array, x: Array) -> Array:

@@ -12,6 +12,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.ruled import (
     A_INSIDE,
     B_INSIDE,
@@ -106,7 +107,7 @@ def closed_form(kind):
 def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
 
-    Writes the saved solution: FREE or TOUCHED with its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED summed, or 0.
+    Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED summed, or 0.
     search: look for another side where a contact is lost, on surfaces without a closed form.
     """
     kind = node[k, KIND]
@@ -116,12 +117,16 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     px, py, pz = turn_into_frame(node, k, ax - x, ay - y, az - z)
     qx, qy, qz = turn_into_frame(node, k, bx - x, by - y, bz - z)
     if kind == lay.CYLINDER:
-        return wrap_cylinder(k, px, py, pz, qx, qy, qz, node)
-    if kind == lay.SPHERE:
-        return _wrap_sphere(k, px, py, pz, qx, qy, qz, node)
-    if kind == lay.CONE:
-        return wrap_cone(k, px, py, pz, qx, qy, qz, node)
-    return wrap_elliptic_cylinder(k, px, py, pz, qx, qy, qz, node)
+        inside = wrap_cylinder(k, px, py, pz, qx, qy, qz, node)
+    elif kind == lay.SPHERE:
+        inside = _wrap_sphere(k, px, py, pz, qx, qy, qz, node)
+    elif kind == lay.CONE:
+        inside = wrap_cone(k, px, py, pz, qx, qy, qz, node)
+    else:
+        inside = wrap_elliptic_cylinder(k, px, py, pz, qx, qy, qz, node)
+    if node[k, S_MODE] == lay.TOUCHED:
+        geodesic(k, node, base_x, base_y, base_z)
+    return inside
 
 
 @jit

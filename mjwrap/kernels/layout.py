@@ -81,7 +81,8 @@ W_RMIN = 108  # smallest of r over the arc so far: <= 0 behind a conjugate point
 W_ANGLE = 109  # about the axis from P to Q [rad]; on a torus how often the hole is passed, downwards positive
 TWIN = 110  # 1 in the second row of a surface that a string may touch twice, 0 else
 W_LAST = 111  # the saved solution before a single wrap (9)
-ROW = 120  # 15 cache lines
+W_FRESH = 120  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
+ROW = 128  # 16 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
 I_LENGTH = 0

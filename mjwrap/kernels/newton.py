@@ -40,13 +40,13 @@ def _dot(node, j, left, k, right):
 
 
 @jit
-def _leave(j, ex, ey, ez, size, node):
-    """Enter the straight segment that leaves obstacle j; return its share of ||f||^2."""
+def _leave(j, ex, ey, ez, size, ends, node):
+    """Enter the straight segment that leaves obstacle j; return its share of ||f||^2, none where the path ends there."""
     node[j, W_EQ] = ex
     node[j, W_EQ + 1] = ey
     node[j, W_EQ + 2] = ez
     node[j, W_LQ] = size
-    if size <= ON_SURFACE * node[j, SIZE]:
+    if ends:
         node[j, W_CQ] = 1.0
         node[j, W_CQ + 1] = 0.0
         node[j, W_CQ + 2] = 0.0
@@ -76,14 +76,23 @@ def evaluate(lo, hi, ends, node):
         geodesic(k, node, gx, gy, gz)
         dx, dy, dz = node[k, W_P] - x, node[k, W_P + 1] - y, node[k, W_P + 2] - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
-        inverse = 1.0 / (size + SHORTEST)
+        short = size <= ON_SURFACE * node[k, SIZE]
+        if short and last >= 0:  # two contacts meet: where they do not go on into each other there is a corner
+            dx, dy, dz = (
+                node[last, W_TQ] + node[k, W_TP],
+                node[last, W_TQ + 1] + node[k, W_TP + 1],
+                node[last, W_TQ + 2] + node[k, W_TP + 2],
+            )
+            inverse = 1.0 / (math.sqrt(dx * dx + dy * dy + dz * dz) + SHORTEST)
+        else:
+            inverse = 1.0 / (size + SHORTEST)
         dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
         node[k, W_E] = dx
         node[k, W_E + 1] = dy
         node[k, W_E + 2] = dz
         node[k, W_L] = size
         along, normal, binormal = 1.0, 0.0, 0.0
-        if size > ON_SURFACE * node[k, SIZE]:
+        if last >= 0 or not short:
             along = _dot(node, k, W_E, k, W_TP)
             normal = _dot(node, k, W_E, k, W_NP)
             binormal = _dot(node, k, W_E, k, W_BP)
@@ -92,14 +101,15 @@ def evaluate(lo, hi, ends, node):
         node[k, W_CP + 2] = binormal
         total += (1.0 - along) ** 2 + normal * normal + binormal * binormal
         if last >= 0:
-            total += _leave(last, dx, dy, dz, size, node)
+            total += _leave(last, dx, dy, dz, size, False, node)
         x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
         last = k
     if last >= 0:
         dx, dy, dz = bx - x, by - y, bz - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
         inverse = 1.0 / (size + SHORTEST)
-        total += _leave(last, dx * inverse, dy * inverse, dz * inverse, size, node)
+        short = size <= ON_SURFACE * node[last, SIZE]
+        total += _leave(last, dx * inverse, dy * inverse, dz * inverse, size, short, node)
     return total
 
 
@@ -251,13 +261,16 @@ def _move(lo, hi, share, node):
 
 
 @jit
-def newton(lo, hi, ends, node, tol, max_iterations):
+def newton(lo, hi, ends, node, tol, max_iterations, square=-1.0):
     """Iterate until ||f|| <= tol; return (||f||, iterations, evaluations), the last state left in `state`.
 
-    A step that does not reduce ||f|| is halved; the iteration stops where halving does not help.
+    square: ||f||^2 where the rows hold the evaluation of their start, else negative. A step that does not reduce ||f|| is
+    halved; the iteration stops where halving does not help.
     """
-    square = evaluate(lo, hi, ends, node)
-    evaluations = 1
+    evaluations = 0
+    if square < 0.0:
+        square = evaluate(lo, hi, ends, node)
+        evaluations = 1
     iterations = 0
     while square > tol * tol and iterations < max_iterations and math.isfinite(square):
         if not step(lo, hi, node):

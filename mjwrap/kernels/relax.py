@@ -61,7 +61,6 @@ def relax(lo, hi, ends, node, passes):
             qx, qy, qz = _following(k, hi, ends, node)
             wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i % SEARCH_EVERY == 0)
             if node[k, S_MODE] == TOUCHED:
-                geodesic(k, node, ends[0], ends[1], ends[2])
                 x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
     return passes
 

@@ -21,6 +21,7 @@ from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import minimal, swept
 from mjwrap.kernels.clearance import bounding_radius, dip, tube_angle, tube_crossing
 from mjwrap.kernels.frames import unit
+from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.ruled import A_INSIDE, B_INSIDE, INSIDE, follow, set_free
 from mjwrap.kernels.shape import height, into_frame, project, turn_into_frame
@@ -32,7 +33,7 @@ W_P, W_Q = lay.W_P, lay.W_Q
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 
 DIRECTIONS = 8  # half planes around AB
-COLUMNS = 18  # samples of a section's upper boundary
+COLUMNS = 14  # samples of a section's upper boundary
 EVEN = 1e-4  # to which a section's boundary is found, in the surface's size
 LIFTS = 3  # corrections where the way over a section meets more of it
 BRIDGE = 0.1  # a string that stands off the surface so high, in its size, between two columns bridges a hollow
@@ -262,7 +263,8 @@ def across(x, y, z):
 @jit
 def _polish(k, ends, node):
     """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length."""
-    error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS)
+    error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, -1.0)
+    node[k, lay.W_FRESH] = error * error
     if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and minimal(k, k + 1, node)):
         return False, 0.0
     return True, node[k, lay.W_L] + node[k, S_ARC] + node[k, lay.W_LQ]
@@ -339,6 +341,7 @@ def wrap_searched(k, ends, node, search):
     if mode == TOUCHED and not search:
         for i in range(lay.STATE):
             node[k, S_MODE + i] = node[k, lay.W_LAST + i]
+        geodesic(k, node, ends[0], ends[1], ends[2])
         return inside
     _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before)
     return inside
@@ -362,8 +365,9 @@ def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, br
         wx, wy, wz = wx / length, wy / length, wz / length
     vx, vy, vz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
     winds = node[k, KIND] == lay.TORUS and node[k, lay.TWIN] == 0.0
-    found, best = False, 0.0
+    found, best, fresh = False, 0.0, -1
     guessed = False
+    j = 0
     memory = carray(stack(), (80,))
     for j in range(DIRECTIONS):
         turn = (j + 1) // 2 * (2.0 * math.pi / DIRECTIONS)
@@ -379,16 +383,20 @@ def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, br
         good, total = _polish(k, ends, node)
         if not good or not _on_branch(k, node, branch, before) or (found and total >= best * (1.0 - 1e-12)):
             continue
-        found, best = True, total
+        found, best, fresh = True, total, j
         node[k, S_SWEEP] = swept(k, node) if winds else 0.0
         for i in range(lay.STATE):
             memory[i] = node[k, S_MODE + i]
         if hinted or not cold:
             break
+    node[k, S_MODE] = TOUCHED
+    if found and fresh == j:
+        return
+    node[k, lay.W_FRESH] = -1.0
     if found or guessed:
         start = 0 if found else lay.STATE
         for i in range(lay.STATE):
             node[k, S_MODE + i] = memory[start + i]
     else:
         _place(k, node, fx, fy, fz, ux, uy, uz, 0.0)
-    node[k, S_MODE] = TOUCHED
+    geodesic(k, node, ends[0], ends[1], ends[2])

@@ -13,7 +13,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import branched, minimal, slip
-from mjwrap.kernels.direct import holds
+from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.newton import newton
 from mjwrap.kernels.relax import path_length, relax, shorten
@@ -21,7 +21,7 @@ from mjwrap.kernels.shape import into_frame, project
 from mjwrap.kernels.touch import drop, follow_branch, in_range, join, split, take_in
 
 DIM, POS, ROT = lay.DIM, lay.POS, lay.ROT
-HINT, S_MODE, W_OLD, W_Y = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Y
+HINT, S_MODE, W_OLD, W_Y, W_FRESH = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Y, lay.W_FRESH
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 MAX_NEWTON = 25
@@ -41,6 +41,17 @@ def _any(lo, hi, node, mode):
         if node[k, S_MODE] == mode:
             return True
     return False
+
+
+@jit
+def _passes(lo, hi, node):
+    """Return how often a cold start wraps obstacle after obstacle: less often where a wrap is a search."""
+    if hi - lo == 1:
+        return 1
+    for k in range(lo, hi):
+        if not closed_form(node[k, lay.KIND]):
+            return COLD_PASSES - 1
+    return COLD_PASSES
 
 
 @jit
@@ -125,17 +136,21 @@ def _solve(lo, hi, ends, node, tol, direct):
     status = lay.CONVERGED
     cold = _any(lo, hi, node, COLD)
     if cold or (direct and hi - lo == 1):
-        evaluations += relax(lo, hi, ends, node, COLD_PASSES if hi - lo > 1 else 1)
+        evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node))
         if cold and hi - lo > 1:
             evaluations += shorten(lo, hi, ends, node, COLD_PASSES)
     _remember(lo, hi, node)
+    fresh = -1.0
+    if cold and hi - lo == 1 and not closed_form(node[lo, lay.KIND]):
+        fresh = node[lo, W_FRESH]
     settled = False
     changes = 0
     for _ in range(MAX_ROUNDS):
         good = True
         error = 0.0
         if _any(lo, hi, node, TOUCHED):
-            error, i, e = newton(lo, hi, ends, node, tol, MAX_NEWTON)
+            error, i, e = newton(lo, hi, ends, node, tol, MAX_NEWTON, fresh)
+            fresh = -1.0
             iterations += i
             evaluations += e
             good = error <= tol and follow_branch(lo, hi, node)

@@ -193,7 +193,6 @@ def take_in(lo, hi, ends, node):
             elif status == lay.CONVERGED:
                 status = lay.NO_GEODESIC if held & SLIPPED else lay.PENETRATING
         if node[k, S_MODE] == TOUCHED:
-            geodesic(k, node, ends[0], ends[1], ends[2])
             x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
             before = k
             added += 1

@@ -3,6 +3,7 @@
 Everything is in SI units and world coordinates unless it says otherwise.
 """
 
+from mjwrap.paths.derivatives import ContactVelocity
 from mjwrap.paths.scene import Obstacle, ViaPoint
 from mjwrap.paths.solution import Contact, PathSolution
 from mjwrap.paths.solve import solve_path
@@ -11,6 +12,7 @@ from mjwrap.paths.sweep import SweepSolution, solve_sweep
 
 __all__ = [
     "Contact",
+    "ContactVelocity",
     "Obstacle",
     "PathSolution",
     "Status",

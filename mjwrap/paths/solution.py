@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout, polyline, segments
-from mjwrap.paths.scene import SAVED, Array, Point, vector
+from mjwrap.paths.derivatives import Derivatives
+from mjwrap.paths.scene import SAVED, Array, Point
 from mjwrap.paths.status import Status
 
 Ints = NDArray[np.int64]
@@ -31,7 +32,7 @@ class Contact:
     second: Contact | None = None
 
 
-class PathSolution:
+class PathSolution(Derivatives):
     """The answer of `solve_path`: length, contacts, and on demand points, speed and wrenches.
 
     length [m]; status: `Status`; converged: status is CONVERGED; tangency_error: the norm of f over all touched
@@ -115,19 +116,10 @@ class PathSolution:
         origin_velocity, insertion_velocity (3,) [m/s]; twists (n, 6), one per obstacle or via point: linear velocity of
         the pose's origin [m/s], then angular velocity [rad/s], world frame; None where nothing moves.
         """
-        rows, n = len(self._node), len(self.contacts)
-        pos, twist = np.zeros((rows + 2, 3)), np.zeros((rows + 2, 6))
+        pos = np.zeros((len(self._node) + 2, 3))
         pos[0], pos[1:-1], pos[-1] = self._origin, self._node[:, layout.POS : layout.POS + 3], self._insertion
-        twist[0, :3] = vector(origin_velocity, 3, "origin_velocity")
-        twist[-1, :3] = vector(insertion_velocity, 3, "insertion_velocity")
-        if twists is not None:
-            given = np.asarray(twists, dtype=np.float64)
-            if given.size or n:
-                if given.shape != (n, 6):
-                    raise GeometryError(f"twists must have shape ({n}, 6), not {given.shape}")
-                twist[1:-1] = given[self._owner]
-        if not np.isfinite(twist).all():
-            raise GeometryError("twists must be finite")
+        twist = self._twists(origin_velocity, insertion_velocity, twists)
+        twist = twist[np.r_[0, self._owner + 1, len(twist) - 1]]
         return float(segments.lengthening_rate(self._count, self._segments, pos, twist))
 
     def wrenches(self, tension: float) -> Array:

@@ -10,7 +10,7 @@ import weakref
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels import coupling, evaluation, readiness
@@ -19,6 +19,7 @@ from mjwrap.paths import Status
 from mjwrap.plan import build_plan
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import check_state, ends_inside, resets
+from mjwrap.system.derivatives import length_jacobian_rate
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
 from mjwrap.takeover import Takeover
@@ -183,6 +184,15 @@ class MuscleSystem(Results):
             self._parent, self._root, state.scratch.cdof, state.scratch.subtree_com, jacobian,
         )  # fmt: skip
         return jacobian
+
+    def length_jacobian_rate(self, data: mujoco.MjData, direction: ArrayLike | None = None) -> Array:
+        """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), or along qvel where None.
+
+        Times qvel it is what the acceleration of the lengths has beside ∂l/∂q qacc. Does a `forward` first. Raises
+        `PathError` naming a muscle without a path, `GeometryError` where the path has no second derivative.
+        """
+        self.forward(data)
+        return length_jacobian_rate(self, self._last, direction)
 
     # -------------------------------------------------------------------------------------- stepping
 

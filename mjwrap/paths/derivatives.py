@@ -1,0 +1,171 @@
+"""Derivatives of a solved path with respect to the poses: gradient and Hessian of its length, sliding of contacts.
+
+Poses move by twists (n + 2, 6), one per slot: origin, every obstacle and via point, insertion; velocity (or small
+translation) of the pose's origin, then angular velocity (or small rotation vector), world frame. Turning the origin,
+the insertion or a via point changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjwrap.errors import GeometryError, PathError
+from mjwrap.kernels import derivatives, layout
+from mjwrap.paths.scene import Array, Point, vector
+from mjwrap.paths.status import Status
+
+if TYPE_CHECKING:
+    from mjwrap.paths.solution import Contact
+
+FAULTS = {
+    derivatives.VANISHING: "the straight segment that leaves {0} has no length, so its direction has no derivative",
+    derivatives.MARGINAL: "its contact with {0} could slip sideways without a change of length",
+    derivatives.FLAT: "the surface of {0} is flat along the path where it touches, so the contact has no one place",
+}
+
+
+@dataclass(frozen=True)
+class ContactVelocity:
+    """How fast a `Contact` moves; its fields are the rates of those of the contact.
+
+    active: whether the obstacle is touched; P, Q (3,): velocities of first and last contact point, what the obstacle
+    carries along and what slides on it, world [m/s] (None where not active); arc_length: rate of s [m/s];
+    second: of where the string touches the same surface again.
+    """
+
+    active: bool
+    P: Array | None
+    Q: Array | None
+    arc_length: float
+    second: ContactVelocity | None = None
+
+
+class Derivatives:
+    """What `PathSolution` knows about its neighbours, by the implicit function theorem; no solve is repeated.
+
+    All of it is exact to the order of the tangency error. Raises `PathError` where the path was not found, and
+    `GeometryError` where the derivative does not exist.
+    """
+
+    status: Status
+    _origin: Point
+    _insertion: Point
+    _ends: tuple[int, int, float, float, float, float, float, float]
+    _node: Array
+    _owner: NDArray[np.int64]
+    contacts: list[Contact]
+
+    def _twists(
+        self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None
+    ) -> Array:
+        """Return the twists (n + 2, 6) of all slots, checked; those of the nodes zero where None."""
+        n = len(self.contacts)
+        twist = np.zeros((n + 2, 6))
+        twist[0, :3] = vector(origin_velocity, 3, "origin_velocity")
+        twist[-1, :3] = vector(insertion_velocity, 3, "insertion_velocity")
+        if twists is not None:
+            given = np.asarray(twists, dtype=np.float64)
+            if given.size or n:
+                if given.shape != (n, 6):
+                    raise GeometryError(f"twists must have shape ({n}, 6), not {given.shape}")
+                twist[1:-1] = given
+        if not np.isfinite(twist).all():
+            raise GeometryError("twists must be finite")
+        return twist
+
+    def _slot(self, slot: int) -> str:
+        """Return what a slot is called."""
+        if slot == 0:
+            return "the origin"
+        if slot > len(self.contacts):
+            return "the insertion"
+        via = self._node[np.argmax(self._owner == slot - 1), layout.KIND] == layout.VIA
+        return f"{'via point' if via else 'obstacle'} {slot - 1}"
+
+    def _raise(self, what: str, fault: int, slot: int) -> None:
+        if fault != derivatives.SOUND:
+            raise GeometryError(f"the path has no {what} here: {FAULTS[fault].format(self._slot(slot))}")
+
+    def _stops(self, what: str, strict: bool = True) -> tuple[int, Array]:
+        """Return the number of stops and their rows; raise where the path was not found or, if strict, for a fault."""
+        if self.status != Status.CONVERGED:
+            raise PathError(f"the path has no {what}: {self.status.message}")
+        stop = np.empty((len(self._node) + 2, derivatives.STOP))
+        count, fault, slot = derivatives.list_stops(*self._ends, self._node, self._owner, stop)
+        if strict:
+            self._raise(what, fault, slot)
+        return count, stop
+
+    def gradient(self) -> Array:
+        """Return ∂l/∂x (n + 2, 6): force [-], then moment about the pose's origin [m], of every slot, world frame.
+
+        Its product with twists is l̇. Tension F pulls with -F times this; `wrenches` has moments about the world origin.
+        Exists, with the geodesic's direction, where a segment vanishes on a surface.
+        """
+        count, stop = self._stops("gradient", strict=False)
+        out = np.zeros((len(self.contacts) + 2, 6))
+        derivatives.add_gradient(count, stop, out)
+        return out
+
+    def stiffness(self) -> Array:
+        """Return ∂²l/∂x² (6 (n + 2), 6 (n + 2)), symmetric: the stiffness of the path under unit tension.
+
+        x: of every slot the translation of the pose's origin [m], then the rotation vector [rad] that turns it from
+        where it is, world axes, in the order of `gradient().ravel()`; rows and columns of what is not touched are zero.
+        The rate of the gradient itself along twists d is `stiffness() @ d` less m × ω / 2 in every moment, m the moment
+        in `gradient()` and ω the angular velocity: turns do not commute, so that rate is not symmetric. `GeometryError`
+        where a segment has no length (an end point on a surface) or a contact is about to slip.
+        """
+        count, stop = self._stops("stiffness")
+        slots = len(self.contacts) + 2
+        twist, out, matrix = np.empty((slots, 6)), np.empty((slots, 6)), np.empty((6 * slots, 6 * slots))
+        derivatives.stiffness(count, stop, twist, out, matrix)
+        return matrix
+
+    def stiffness_times(self, direction: ArrayLike) -> Array:
+        """Return `stiffness()` times a direction (n + 2, 6) as (n + 2, 6), at a cost that grows with n, not its square.
+
+        `GeometryError` as for `stiffness`, and for a direction of another shape or not finite.
+        """
+        count, stop = self._stops("stiffness")
+        given = np.array(direction, dtype=np.float64)
+        shape = (len(self.contacts) + 2, 6)
+        if given.shape != shape or not np.isfinite(given).all():
+            raise GeometryError(f"direction must be finite and have shape {shape}, not {given.shape}")
+        out = np.zeros(shape)
+        derivatives.add_stiffness_times(count, given, stop, out)
+        return out
+
+    def contact_velocities(
+        self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None = None
+    ) -> list[ContactVelocity]:
+        """Return one `ContactVelocity` per obstacle, for the motion of `speed`'s arguments.
+
+        At touchdown (arc length zero) it is that of the path that touches. `GeometryError` as for `stiffness`, and
+        where the surface is flat along the path, so that a contact may lie anywhere.
+        """
+        count, stop = self._stops("contact velocities")
+        twist = self._twists(origin_velocity, insertion_velocity, twists)
+        rates = np.zeros((len(self._node), 7))
+        size = np.ascontiguousarray(self._node[:, layout.SIZE])
+        self._raise("contact velocities", *derivatives.contact_rates(count, twist, size, stop, rates))
+        found: list[ContactVelocity] = []
+        for row, k in enumerate(self._owner):
+            one = self._contact_velocity(row, twist[k + 1], rates[row])
+            if k == len(found):
+                found.append(one)
+            elif one.active:
+                found[k] = replace(found[k], second=one) if found[k].active else one
+        return found
+
+    def _contact_velocity(self, index: int, twist: Array, rate: Array) -> ContactVelocity:
+        row = self._node[index]
+        if row[layout.KIND] == layout.VIA:
+            return ContactVelocity(True, twist[:3].copy(), twist[:3].copy(), 0.0)
+        if row[layout.S_MODE] != layout.TOUCHED:
+            return ContactVelocity(False, None, None, 0.0)
+        return ContactVelocity(True, rate[:3].copy(), rate[3:6].copy(), float(rate[6]))

@@ -1,0 +1,74 @@
+"""How the length Jacobian of a MuscleSystem changes along a motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjwrap.errors import GeometryError, PathError, StateError
+from mjwrap.kernels import coupling, derivatives, jacobian_rate
+from mjwrap.mjcf import name_of
+from mjwrap.paths.derivatives import FAULTS
+from mjwrap.system.state import State
+
+if TYPE_CHECKING:
+    from mjwrap.system.muscle_system import MuscleSystem
+
+Array = NDArray[np.float64]
+
+
+def length_jacobian_rate(muscles: MuscleSystem, state: State, direction: ArrayLike | None) -> Array:
+    """Return the rate (n, nv) of dl/dq along `direction` (nv,), or qvel, at the poses that `state` was evaluated at."""
+    model, plan, scratch = muscles.model, muscles._plan, state.scratch
+    for i in np.flatnonzero(state.status):
+        raise PathError(
+            f"muscle '{muscles.names[i]}' has no path whose derivatives could be taken: {muscles.reason(int(i))}"
+        )
+    if direction is not None:
+        given = np.asarray(direction, dtype=np.float64)
+        if given.shape != (model.nv,) or not np.isfinite(given).all():
+            raise StateError(f"direction must be finite and have shape ({model.nv},), not {given.shape}")
+        scratch.qvel[:] = given
+        mujoco.mj_comVel(model, scratch)
+    longest = max((int(r[coupling.R_HI] - r[coupling.R_LO]) for r in plan.routes), default=0) + 2
+    work = (np.empty((longest, 6)), np.empty((longest, 6)), np.empty((longest, 6)))
+    stop = np.empty((longest, derivatives.STOP))
+    jacobian = np.zeros((plan.n, model.nv))
+    kinematics = (
+        *muscles._dofs, muscles._parent, *_joints(model), muscles._root,
+        scratch.cvel, scratch.cdof, scratch.cdof_dot, scratch.subtree_com,
+    )  # fmt: skip
+    fault, route, slot = jacobian_rate.length_jacobian_rate(
+        plan.routes, plan.weights, plan.links, scratch.site_xpos, state.node, kinematics,
+        *work, np.arange(longest), stop, jacobian,
+    )  # fmt: skip
+    if fault != derivatives.SOUND:
+        row = plan.routes[route]
+        name = muscles.names[int(row[coupling.R_MUSCLE])]
+        where = _slot(model, plan.links, row, slot)
+        raise GeometryError(f"muscle '{name}': dl/dq has no rate here: {FAULTS[fault].format(where)}")
+    return jacobian
+
+
+def _joints(model: mujoco.MjModel) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the body of every dof (nv,), and whether it is a rotation of a ball or free joint (nv,)."""
+    kind = model.jnt_type[model.dof_jntid]
+    first = model.jnt_dofadr[model.dof_jntid]
+    ball = kind == int(mujoco.mjtJoint.mjJNT_BALL)
+    free = (kind == int(mujoco.mjtJoint.mjJNT_FREE)) & (np.arange(model.nv) >= first + 3)
+    return np.asarray(model.dof_bodyid, dtype=np.int64), ball | free
+
+
+def _slot(model: mujoco.MjModel, links: NDArray[np.int64], route: NDArray[np.int64], slot: int) -> str:
+    """Return the name of the site or geom in a slot of a route."""
+    lo, hi = route[coupling.R_LO], route[coupling.R_HI]
+    if slot in (0, hi - lo + 1):
+        site, geom = route[coupling.R_FROM if slot == 0 else coupling.R_TO], -1
+    else:
+        site, geom = links[lo + slot - 1, coupling.L_SITE], links[lo + slot - 1, coupling.L_GEOM]
+    if geom >= 0:
+        return f"geom '{name_of(model, mujoco.mjtObj.mjOBJ_GEOM, int(geom))}'"
+    return f"site '{name_of(model, mujoco.mjtObj.mjOBJ_SITE, int(site))}'"
