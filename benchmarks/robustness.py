@@ -36,8 +36,11 @@ from certificate import Case, findings
 from multistart import SHORTER, shortest
 from random_scenes import CLASSES, Maker, Scene
 from robustness_table import NOTES, PEERS, REFUSALS, Tally, table
+from shaking import lowest, shaken_stiffness
 
 HINTS = ("good", "random", "none")
+SHAKEN = 0.02  # share of the paths that are shaken
+SLIPPING = 1e-3  # negative stiffness of a shaken path, of its largest: differences are good to a tenth of it
 CHUNK = {1: 100, 3: 100, 5: 100, 16: 40, 64: 20}  # scenes made from one pool
 
 
@@ -77,8 +80,23 @@ def _solve(scene: Scene, obstacles: list[mw.Obstacle], tally: Tally) -> Answer:
     return answer
 
 
-def _judge(answers: Iterable[Answer], tally: Tally) -> None:
-    """Judge all converged answers of one kind at once."""
+def _shake(answer: Answer, tally: Tally) -> None:
+    """Measure the second derivative of a path's length by shifting its contact points."""
+    assert answer.case is not None
+    if not any(answer.case.contacts):
+        return
+    try:
+        stiffness = lowest(shaken_stiffness(answer.case))
+    except ValueError:  # an arc too short for differences
+        return
+    tally.shaken += 1
+    if stiffness < -SLIPPING:
+        tally.refuted += 1
+        answer.reason = f"REFUTED shaken: stiffness {stiffness:.1e}"
+
+
+def _judge(answers: Iterable[Answer], tally: Tally, shake: np.random.Generator) -> None:
+    """Judge all converged answers of one kind at once, and shake a share of those that stand."""
     claimed = [answer for answer in answers if answer.case is not None]
     for answer, reason in zip(claimed, findings([a.case for a in claimed if a.case]), strict=True):
         if reason:
@@ -86,12 +104,14 @@ def _judge(answers: Iterable[Answer], tally: Tally) -> None:
             tally.refuted += 1
             tally.folded += reason.startswith("folded")
             tally.penetrating += reason.startswith("penetrating")
+        elif answer.case is not None and shake.random() < SHAKEN:
+            _shake(answer, tally)
 
 
 def run_chunk(
     job: tuple[str, int, int, int, int, tuple[str, ...]],
 ) -> tuple[str, dict[str, Tally], list[dict]]:
-    """Return the tallies and saved cases of one chunk: class, seed, number, scenes, scenes to search, kinds of hints."""
+    """Return tallies and saved cases of one chunk: class, seed, number, scenes, scenes to search, kinds of hints."""
     name, seed, number, count, search, kinds = job
     maker = Maker(name, seed, number)
     chained = [maker.scene(True) for _ in range(count if "good" in kinds else (count + 1) // 2)]
@@ -102,7 +122,7 @@ def run_chunk(
     for kind in kinds:
         scenes = chained if kind == "good" else mixed
         answers[kind] = [_solve(s, s.hinted(kind) or s.obstacles, tallies[kind]) for s in scenes]
-        _judge(answers[kind], tallies[kind])
+        _judge(answers[kind], tallies[kind], np.random.default_rng([seed, number]))
     saved: list[dict] = []
     searched = set(np.random.default_rng([seed, number]).permutation(count)[:search].tolist())
     for kind in kinds:

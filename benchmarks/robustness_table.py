@@ -11,9 +11,9 @@ import numpy as np
 
 REFUSALS = ("OUT_OF_RANGE", "NO_GEODESIC")  # no path of that kind exists, says the solver
 PEERS = """\
-CableSpan (C++, measured on the same machine): of cold starts on mixed scenes 8 to 10 % do not converge, and nothing says
-so; folded paths, a longest path over a sphere (0.33915 m for a minimum of 0.30562 m) and a path of 28,792 m round a
-cylinder of 0.036 m count as converged; end points inside a surface throw."""
+CableSpan (C++, measured on the same machine): of cold starts on mixed scenes 8 to 10 % do not converge, and nothing
+says so; folded paths, a longest path over a sphere (0.33915 m for a minimum of 0.30562 m) and a path of 28,792 m round
+a cylinder of 0.036 m count as converged; end points inside a surface throw."""
 
 
 @dataclass
@@ -29,6 +29,7 @@ class Tally:
     penetrating: int = 0
     compared: int = 0
     searched: int = 0
+    shaken: int = 0
     longer: int = 0
     refused_wrongly: int = 0
     evaluations: list[int] = field(default_factory=list)
@@ -61,7 +62,10 @@ class Tally:
             "status": dict(self.status),
             "not_converged": self.lost,
             "refused": sum(self.status[name] for name in REFUSALS),
-            **{name: getattr(self, name) for name in ("refused_wrongly", "longer", "compared", "searched")},
+            **{
+                name: getattr(self, name)
+                for name in ("refused_wrongly", "longer", "compared", "searched", "shaken")
+            },
             "evaluations_median": float(np.median(self.evaluations)) if self.evaluations else math.nan,
             "evaluations_most": max(self.evaluations, default=0),
             "us_median": float(np.median(self.microseconds)) if self.microseconds else math.nan,

@@ -16,6 +16,7 @@ from mjwrap.errors import (
 )
 
 if TYPE_CHECKING:
+    from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
     from mjwrap.fitting import (
         Fit,
         fit_capsule,
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "ImplicitSurface": "custom_surfaces",
+    "ParametricSurface": "custom_surfaces",
     "Capsule": "surfaces",
     "Cone": "surfaces",
     "Cylinder": "surfaces",
@@ -86,11 +89,13 @@ __all__ = [
     "EllipticCylinder",
     "Fit",
     "GeometryError",
+    "ImplicitSurface",
     "MjwrapError",
     "ModelError",
     "MuJoCoMuscle",
     "MuscleSystem",
     "Obstacle",
+    "ParametricSurface",
     "PathActuator",
     "PathError",
     "PathSolution",

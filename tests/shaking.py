@@ -1,9 +1,11 @@
 """The second derivative of a path's length by shaking it.
 
-Contact points are shifted sideways on their surfaces, geodesics between them are found anew, and lengths are measured.
+Contact points are shifted sideways on their surfaces, geodesics between them are found anew, and lengths are
+measured.
 
-Nothing here knows the theory of Jacobi fields by which `certificate.stiffness` (and the solver) tell a minimum from a saddle. It costs
-a few hundred geodesics, so it serves tests, and a random share of the scenes of robustness.py.
+Nothing here knows the theory of Jacobi fields by which `certificate.stiffness` (and the solver) tell a minimum
+from a saddle. It costs a few hundred geodesics, so it serves tests, and a random share of the scenes of
+robustness.py.
 """
 
 from __future__ import annotations
@@ -50,12 +52,16 @@ def shaken_stiffness(case: Case) -> Array:
     for group in groups:
         for k in range(len(group.touches)):
             place = places[id(group.touches[k])]
-            H[2 * place : 2 * place + 2, 2 * place : 2 * place + 2], moved[place] = _shaken_arc(case, group, k)
+            H[2 * place : 2 * place + 2, 2 * place : 2 * place + 2], moved[place] = _shaken_arc(
+                case, group, k
+            )
     fixed = np.zeros(1)
     ends = [(case.origin[None], fixed), *((far, step[1:]) for _, far, step in moved)]
     starts = [*((near, step[:1]) for near, _, step in moved), (case.insertion[None], fixed)]
     for k, ((a, h_a), (b, h_b)) in enumerate(zip(ends, starts, strict=True)):
-        lengths = np.linalg.norm(b[None] - a[:, None], axis=2)  # [shift of the near end, shift of the far end]
+        lengths = np.linalg.norm(
+            b[None] - a[:, None], axis=2
+        )  # [shift of the near end, shift of the far end]
         rows = [i for i, x in ((2 * k - 1, a), (2 * k, b)) if len(x) == 3]
         steps = [float(h[0]) for h, x in ((h_a, a), (h_b, b)) if len(x) == 3]
         H[np.ix_(rows, rows)] += _second(lengths, steps)
@@ -63,7 +69,7 @@ def shaken_stiffness(case: Case) -> Array:
 
 
 def _shaken_arc(case: Case, group: Group, k: int) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Return the second derivative of one geodesic's length, and its ends shifted by -h, 0, h (3, 3) each, in the world."""
+    """Return the second derivative of one geodesic's length, and its ends shifted by -h, 0, h (3, 3), in the world."""
     shape, d = group.shape, group.d[k : k + 1]
     size = 1.0 / float(shape.bend(d)[0])
     if group.s[k] < SHORT * size:
@@ -78,7 +84,9 @@ def _shaken_arc(case: Case, group: Group, k: int) -> tuple[Array, tuple[Array, A
     far = shifted(shape, many, np.tile(Q, (2, 1)), np.tile(b_Q, (2, 1)), by)
     near, far = (np.array([x[0], middle, x[1]]) for x, middle in ((near, P), (far, Q)))
     i, j = np.divmod(np.arange(9), 3)
-    lengths = between(shape, np.repeat(d, 9, axis=0), near[i], far[j], np.tile(t, (9, 1)), np.full(9, group.s[k]))
+    lengths = between(
+        shape, np.repeat(d, 9, axis=0), near[i], far[j], np.tile(t, (9, 1)), np.full(9, group.s[k])
+    )
     turn, pos = group.turn[k], np.asarray(case.obstacles[group.touches[k].index].pos)
     world = near @ turn.T + pos, far @ turn.T + pos, np.array([h, h])
     return _second(lengths.reshape(3, 3), [h, h]), world

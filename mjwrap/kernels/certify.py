@@ -114,7 +114,8 @@ def slip(lo, hi, node, size):
     """Write to columns W_Y + 1, W_Y + 2 a sideways variation (d1, d2) by which the path of the last evaluation shortens.
 
     The second variation's pivots, as in `minimal`, with the shifts x, y of P and Q for unknowns; the first pivot that is
-    not positive gives a direction of negative curvature. Scaled to `size`, in radii. Returns False where there is none.
+    not positive gives a direction of negative curvature, up to that obstacle. Scaled to `size`, in radii. Returns the
+    obstacle, or -1 where there is none.
     """
     last = -1
     c, turn = 0.0, 0.0
@@ -148,7 +149,7 @@ def slip(lo, hi, node, size):
     if failed < 0 and last >= 0 and 1.0 / max(node[last, W_LQ], SHORTEST) + c <= 0.0:
         failed, far = last, True
     if failed < 0:
-        return False
+        return -1
     x, y = 1.0, 0.0
     if far:
         x, y = node[failed, W_X + 1], 1.0
@@ -167,7 +168,7 @@ def slip(lo, hi, node, size):
             scale = size / most if k <= failed else 0.0
             node[k, lay.W_Y + 1] *= scale
             node[k, lay.W_Y + 2] = min(max(node[k, lay.W_Y + 2] * scale, -1.0), 1.0)
-    return True
+    return failed
 
 
 @jit

@@ -83,12 +83,24 @@ def _start_afresh(lo, hi, cold, node):
 
 
 @jit
-def _slip_off(lo, hi, node, sign):
-    """Move a path that is a saddle of length a little down the side on which a string would slip."""
-    if slip(lo, hi, node, KICK):
-        for k in range(lo, hi):
-            if node[k, S_MODE] == TOUCHED:
-                displace(k, 0.0, sign * node[k, W_Y + 1], sign * node[k, W_Y + 2], 0.0, node)
+def _slip_off(lo, hi, ends, node, sign):
+    """Move a path that is a saddle of length a little down the side on which a string would slip.
+
+    The obstacles behind the last one moved follow first: wraps in order from the origin on would undo the move.
+    """
+    failed = slip(lo, hi, node, KICK)
+    if failed < 0:
+        return
+    for k in range(lo, failed + 1):
+        if node[k, S_MODE] == TOUCHED:
+            displace(k, 0.0, sign * node[k, W_Y + 1], sign * node[k, W_Y + 2], 0.0, node)
+            geodesic(k, node, ends[0], ends[1], ends[2])
+    q = lay.W_Q
+    ends = (
+        ends[0], ends[1], ends[2], node[failed, q], node[failed, q + 1], node[failed, q + 2],
+        ends[6], ends[7], ends[8],
+    )  # fmt: skip
+    relax(failed + 1, hi, ends, node, 1)
 
 
 @jit
@@ -176,7 +188,7 @@ def _solve(lo, hi, ends, node, tol, direct):
         if repairs == AFRESH:
             _start_afresh(lo, hi, cold, node)
         elif saddle:
-            _slip_off(lo, hi, node, 1.0 if repairs % 2 == 0 else -1.0)
+            _slip_off(lo, hi, ends, node, 1.0 if repairs % 2 == 0 else -1.0)
         passes = (REPAIR_PASSES + repairs) << repairs if hi - lo > 1 else 1
         evaluations += relax(lo, hi, ends, node, passes)
         repairs += 1

@@ -1,0 +1,136 @@
+"""Where generated modules are kept, and how they are loaded: written once, compiled once, found again by their content.
+
+A module's name is a hash of all that it is made from, so that nothing is ever out of date. Files are written beside the
+kernels' machine code in one go, with a fixed date: processes that write one at the same time write the same.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.util
+import os
+import re
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from numba.core import event
+from numba.core.errors import NumbaError
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import _jit
+
+PREFIX = "mjwrap_surface_"
+_HERE = Path(__file__).parent
+_DATE = 1_000_000_000  # of every file: numba asks for the date of a source to see whether machine code is out of date
+_NOTICE = "mjwrap: compiling the surface {}, once for this machine and version (some seconds) ..."
+_LOCK = threading.RLock()
+
+
+@cache
+def generator_hash() -> str:
+    """Return a hash over the sources of this package, which write the modules."""
+    digest = hashlib.sha256()
+    for file in sorted(_HERE.rglob("*.py")):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def key_of(*parts: object) -> str:
+    """Return 16 hexadecimal digits that change with anything that a module is made from."""
+    return hashlib.sha256("\0".join([generator_hash(), *map(repr, parts)]).encode()).hexdigest()[:16]
+
+
+def load(key: str, make: Callable[[], str], label: str) -> ModuleType:
+    """Return the compiled module of a key, from this process, the disk, or `make`; label: for the user."""
+    name = PREFIX + key
+    with _LOCK:
+        if name in sys.modules:
+            return sys.modules[name]
+        path = Path(_jit._CACHE) / f"{name}.py"
+        if path.is_file():
+            try:
+                return _import(name, path, label)
+            except GeometryError:
+                raise
+            except Exception:
+                pass  # a damaged file: made anew
+        _write(path, make())
+        return _import(name, path, label)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file in one go."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.utime(name, (_DATE, _DATE))
+    try:
+        os.replace(name, path)
+    except OSError:  # where files in use cannot be replaced, another process has just put the same one there
+        os.unlink(name)
+        if not path.is_file():
+            raise
+
+
+def _import(name: str, path: Path, label: str) -> ModuleType:
+    """Run a generated module, which compiles its functions or loads their machine code."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # for good: rows of paths hold addresses of its machine code
+    try:
+        with _cache_of_the_kernels(), event.install_listener("numba:compile", _Announcer(name, label)):
+            spec.loader.exec_module(module)
+            module.TEXT = path.read_text(encoding="utf-8")  # pyright: ignore[reportAttributeAccessIssue]
+    except NumbaError as error:
+        forget(name, path)
+        lines = [line for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines() if line.strip()]
+        raise GeometryError(f"it cannot be compiled: {' '.join(lines[:3])}") from error
+    except BaseException:
+        forget(name, path)
+        raise
+    return module
+
+
+def forget(name: str, path: Path) -> None:
+    """Drop a module that turned out not to be usable, from this process and from the disk."""
+    sys.modules.pop(name, None)
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
+@contextlib.contextmanager
+def _cache_of_the_kernels() -> Iterator[None]:
+    """Have numba keep machine code where the kernels' is."""
+    before = _jit.config.CACHE_DIR
+    _jit.config.CACHE_DIR = _jit._CACHE
+    try:
+        yield
+    finally:
+        _jit.config.CACHE_DIR = before
+
+
+class _Announcer(event.Listener):
+    """Tells the user that a surface is being compiled rather than loaded."""
+
+    def __init__(self, module: str, label: str) -> None:
+        self.module, self.label, self.silent = module, label, False
+
+    def on_start(self, event: Any) -> None:
+        dispatcher = event.data.get("dispatcher") if event.data else None
+        function = getattr(dispatcher, "py_func", None)
+        if not self.silent and getattr(function, "__module__", "") == self.module:
+            self.silent = True
+            print(_NOTICE.format(self.label), file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        pass
