@@ -19,6 +19,7 @@ class CustomSurface(Surface):
     """A surface made of machine code; equal to any other made from the same source and numbers."""
 
     kind: ClassVar[int] = layout.CUSTOM
+    hollow: ClassVar[bool] = True
     _made: build.Made
 
     def _set(self, made: build.Made) -> None:

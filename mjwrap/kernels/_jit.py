@@ -83,7 +83,7 @@ class _Announcer(event.Listener):
     def on_start(self, event: Any) -> None:
         dispatcher = event.data.get("dispatcher") if event.data else None
         function = getattr(dispatcher, "py_func", None)
-        if not self.silent and getattr(function, "__module__", "").startswith("mjwrap."):
+        if not self.silent and getattr(function, "__module__", "").startswith("mjwrap.kernels."):
             self.silent = True
             print(_NOTICE, file=sys.stderr, flush=True)
 

@@ -106,7 +106,7 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
 def bounding_radius(node, k):
     """Return the radius of a sphere about the origin of S that holds the surface; infinite where it is not known [m]."""
     kind = node[k, KIND]
-    if kind == lay.SPHERE:
+    if kind == lay.SPHERE or kind == lay.CUSTOM:
         return node[k, DIM]
     if kind == lay.ELLIPSOID:
         return max(node[k, DIM], max(node[k, DIM + 1], node[k, DIM + 2]))

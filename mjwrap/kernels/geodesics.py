@@ -10,6 +10,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.closed_forms import capsule, cone, cylinder, sphere
+from mjwrap.kernels.custom import custom_geodesic
 from mjwrap.kernels.frames import cross
 from mjwrap.kernels.quadric import quadric
 from mjwrap.kernels.shape import project
@@ -38,6 +39,8 @@ def geodesic(k, node, base_x, base_y, base_z):
         torus(k, node)
     elif kind == lay.CONE:
         cone(k, node)
+    elif kind == lay.CUSTOM:
+        custom_geodesic(k, node)
     else:
         capsule(k, node)
     x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z

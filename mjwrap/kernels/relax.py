@@ -7,14 +7,14 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import branched
-from mjwrap.kernels.direct import wrap
+from mjwrap.kernels.direct import closed_form, wrap
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.ruled import TWO_PI
 
 KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_P, W_Q, W_OLD = lay.W_P, lay.W_Q, lay.W_OLD
-COLD, TOUCHED = lay.COLD, lay.TOUCHED
+COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 LEAST_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
 MOST_FLIPS = 3
 WINDOW = 4
@@ -80,12 +80,32 @@ def path_length(lo, hi, ends, node):
 
 
 @jit
-def _flipped(k, node):
-    """Return whether obstacle k may be passed on its other side: it is touched, no hint says where, and it is passed
-    by so much that the other way can be shorter."""
-    if not branched(node[k, KIND]) or node[k, HINT] > 0.0 or node[k, S_MODE] != TOUCHED or node[k, lay.TWIN] > 0.0:
+def _flips(k, node):
+    """Return whether obstacle k may be passed on its other side: a topological one, known in closed form, that no hint
+    chooses, and that is swept by so much that the other way can be shorter."""
+    if not (branched(node[k, KIND]) and closed_form(node[k, KIND])) or node[k, HINT] > 0.0:
         return False
-    return abs(node[k, S_SWEEP]) >= LEAST_SWEEP
+    return node[k, S_MODE] == TOUCHED and abs(node[k, S_SWEEP]) >= LEAST_SWEEP
+
+
+@jit
+def _searchable(k, node):
+    """Return whether another wrap of obstacle k can be looked for: it is touched, and no hint chooses its side."""
+    if closed_form(node[k, KIND]) or node[k, HINT] > 0.0 or node[k, lay.TWIN] > 0.0:
+        return False
+    return node[k, S_MODE] == TOUCHED
+
+
+@jit
+def _other_way(first, last, node):
+    """Change the sides of the obstacles first..last, or have them searched for anew."""
+    for j in range(first, last):
+        if _flips(j, node):
+            node[j, S_SWEEP] -= math.copysign(TWO_PI, node[j, S_SWEEP])
+        elif _searchable(j, node):
+            node[j, S_MODE] = COLD
+            if j + 1 < node.shape[0] and node[j + 1, lay.TWIN] > 0.0:
+                node[j + 1, S_MODE] = FREE
 
 
 @jit
@@ -113,25 +133,25 @@ def _between(lo, hi, first, last, ends, node):
 
 @jit
 def shorten(lo, hi, ends, node, passes):
-    """Try the other sides of all surfaces with a topological side and no hint; keep what is shorter.
+    """Try other sides for all obstacles without a hint; keep what is shorter.
 
-    Runs of up to MOST_FLIPS neighbours change sides together, with the path WINDOW obstacles to both sides of them free to
-    follow; until nothing gets shorter. A local search, at cold starts only. Returns the evaluations spent.
+    Sides known in closed form change in runs of up to MOST_FLIPS neighbours together; others are searched for anew, one at a
+    time, between the contacts that their neighbours have now. The path WINDOW obstacles to both sides is free to follow. Until
+    nothing gets shorter: a local search, at cold starts only. Returns the evaluations spent.
     """
     spent = 0
     for _ in range(SWEEPS):
         shorter = False
         for run in range(1, MOST_FLIPS + 1):
             for k in range(lo, hi - run + 1):
-                if not (_flipped(k, node) and _flipped(k + run - 1, node)):
+                whole = _flips(k, node) and _flips(k + run - 1, node)
+                if not (whole or (run == 1 and _searchable(k, node))):
                     continue
                 first, last = max(lo, k - WINDOW), min(hi, k + run + WINDOW)
                 part = _between(lo, hi, first, last, ends, node)
                 before = path_length(first, last, part, node)
                 _keep(first, last, node, W_OLD, False)
-                for j in range(k, k + run):
-                    if _flipped(j, node):
-                        node[j, S_SWEEP] -= math.copysign(TWO_PI, node[j, S_SWEEP])
+                _other_way(k, k + run, node)
                 spent += relax(first, last, part, node, passes)
                 if path_length(first, last, part, node) < before * (1.0 - 1e-9):
                     shorter = True
@@ -140,7 +160,7 @@ def shorten(lo, hi, ends, node, passes):
                 for j in range(first, last):
                     if node[j, S_MODE] == TOUCHED:
                         geodesic(j, node, ends[0], ends[1], ends[2])
-        if not shorter:
+        if not shorter or hi - lo == 1:
             break
         spent += relax(lo, hi, ends, node, passes)
     return spent

@@ -32,7 +32,7 @@ S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, la
 W_P, W_Q = lay.W_P, lay.W_Q
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 
-DIRECTIONS = 8  # half planes around AB
+DIRECTIONS = 12  # half planes around AB
 COLUMNS = 14  # samples of a section's upper boundary
 EVEN = 1e-4  # to which a section's boundary is found, in the surface's size
 LIFTS = 3  # corrections where the way over a section meets more of it
@@ -304,6 +304,30 @@ def _on_branch(k, node, known, before):
 
 
 @jit
+def _caught(k, ends, node, mode, x, y, z, dx, dy, dz):
+    """Return whether a string that is free now hangs on the surface, because that was pulled through it since.
+
+    S_P and S_T hold the surface point next to a free string (x, y, z: its lowest point), and the normal there. Where the
+    normal has turned by more than a right angle the surface has changed sides: if a string can hold on the side
+    on which it was, it does. Long surfaces catch it, round ones slip through.
+    """
+    px, py, pz, nx, ny, nz = project(node, k, x, y, z)
+    if mode == FREE and nx * node[k, S_T] + ny * node[k, S_T + 1] + nz * node[k, S_T + 2] < 0.0:
+        _place(k, node, node[k, S_P], node[k, S_P + 1], node[k, S_P + 2], dx, dy, dz, 0.0)
+        good, _ = _polish(k, ends, node)
+        if good:
+            node[k, S_SWEEP] = 0.0
+            return True
+    node[k, S_P] = px
+    node[k, S_P + 1] = py
+    node[k, S_P + 2] = pz
+    node[k, S_T] = nx
+    node[k, S_T + 1] = ny
+    node[k, S_T + 2] = nz
+    return False
+
+
+@jit
 def wrap_searched(k, ends, node, search):
     """Wrap the string from A to B over obstacle k; `ends` as for `solve_span`. Returns A_INSIDE and B_INSIDE summed.
 
@@ -336,6 +360,9 @@ def wrap_searched(k, ends, node, search):
             if good:
                 node[k, S_SWEEP] = swept(k, node) if winds else 0.0
                 return inside
+        keeps = node[k, KIND] == lay.ELLIPSOID or node[k, KIND] == lay.CAPSULE
+        if keeps and _caught(k, ends, node, mode, ax + share * dx, ay + share * dy, az + share * dz, dx, dy, dz):
+            return inside
         set_free(node, k, straight)
         return inside
     if mode == TOUCHED and not search:

@@ -11,6 +11,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.closed_forms import capsule_normal
+from mjwrap.kernels.custom import custom_height, custom_project
 from mjwrap.kernels.quadric import inverse_squares, onto
 
 KIND, DIM, SIZE, POS, ROT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.ROT
@@ -113,6 +114,8 @@ def project(node, k, x, y, z):
         return _project_torus(node[k, DIM], node[k, DIM + 1], x, y, z)
     if kind == lay.CONE:
         return _project_cone(node[k, DIM], node[k, DIM + 1], x, y, z)
+    if kind == lay.CUSTOM:
+        return custom_project(k, node, x, y, z)
     radius, half = node[k, DIM], node[k, DIM + 1]
     nx, ny, nz = capsule_normal(radius, half, x, y, z)
     return radius * nx, radius * ny, min(max(z, -half), half) + radius * nz, nx, ny, nz
@@ -145,5 +148,7 @@ def height(node, k, x, y, z):
         reach = node[k, DIM] + slope * z
         rho = math.sqrt(x * x + y * y)
         return (rho - reach) / math.sqrt(1.0 + slope * slope)
+    if kind == lay.CUSTOM:
+        return custom_height(k, node, x, y, z)
     z -= min(max(z, -node[k, DIM + 1]), node[k, DIM + 1])
     return math.sqrt(x * x + y * y + z * z) - node[k, DIM]

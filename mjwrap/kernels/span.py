@@ -149,8 +149,8 @@ def _solve(lo, hi, ends, node, tol, direct):
     cold = _any(lo, hi, node, COLD)
     if cold or (direct and hi - lo == 1):
         evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node))
-        if cold and hi - lo > 1:
-            evaluations += shorten(lo, hi, ends, node, COLD_PASSES)
+        if cold and (hi - lo > 1 or closed_form(node[lo, lay.KIND])):
+            evaluations += shorten(lo, hi, ends, node, COLD_PASSES if hi - lo > 1 else 1)
     _remember(lo, hi, node)
     fresh = -1.0
     if cold and hi - lo == 1 and not closed_form(node[lo, lay.KIND]):

@@ -56,6 +56,11 @@ def drop(lo, hi, node):
         if node[k, S_MODE] == TOUCHED and node[k, S_ARC] < 0.0:
             node[k, S_MODE] = FREE
             node[k, S_ARC] = 0.0
+            n = lay.W_NP  # beside a free string S_T holds the normal, see `_caught`
+            tx, ty, tz = turn_into_frame(node, k, node[k, n], node[k, n + 1], node[k, n + 2])
+            node[k, lay.S_T] = tx
+            node[k, lay.S_T + 1] = ty
+            node[k, lay.S_T + 2] = tz
             dropped += 1
     return dropped
 
@@ -206,6 +211,8 @@ def in_range(lo, hi, ends, node):
         if node[k, S_MODE] != TOUCHED:
             continue
         kind = node[k, KIND]
+        if kind == lay.CUSTOM and node[k, lay.W_ANGLE] != 0.0:
+            return False
         half = 1e300
         if kind == lay.CYLINDER:
             half = node[k, DIM + 1]

@@ -88,6 +88,15 @@ class PathSolution(Derivatives):
         """Whether the path was found and certified."""
         return self.status == Status.CONVERGED
 
+    @property
+    def branch(self) -> Array:
+        """What a warm start keeps of this path, a copy, (rows, 9), one row per obstacle, two for one with hollows.
+
+        Columns: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc length [m], in the surface's
+        frame. `solve_path(start=branch)` with the same pose gives the same bits whatever was solved in between.
+        """
+        return self._saved.copy()
+
     def __repr__(self) -> str:
         touched = sum(contact.active for contact in self.contacts)
         return (

@@ -14,11 +14,18 @@ from mjwrap.paths.scene import SAVED, Array, Obstacle, Point, ViaPoint, owners, 
 from mjwrap.paths.solution import PathSolution
 
 
-def _start(start: PathSolution | None, node: Array) -> None:
+def _start(start: PathSolution | Array | None, node: Array) -> None:
     if start is None:
         return
+    if isinstance(start, np.ndarray):
+        if start.shape != (len(node), layout.STATE) or not np.isfinite(start).all():
+            raise GeometryError(
+                f"start must be a finite branch of shape ({len(node)}, {layout.STATE}) for these obstacles, not {start.shape}"
+            )
+        node[:, SAVED] = start
+        return
     if not isinstance(start, PathSolution):
-        raise GeometryError(f"start must be the PathSolution of an earlier solve, not {start!r}")
+        raise GeometryError(f"start must be the PathSolution of an earlier solve, or its branch, not {start!r}")
     if not np.array_equal(start._node[:, layout.KIND], node[:, layout.KIND]):
         raise GeometryError("start belongs to a path over other obstacles: number and kinds must be the same")
     node[:, SAVED] = start._saved
@@ -30,14 +37,14 @@ def solve_path(
     obstacles: Sequence[Obstacle | ViaPoint] = (),
     *,
     method: str = "newton",
-    start: PathSolution | None = None,
+    start: PathSolution | Array | None = None,
     tol: float = 1e-10,
     **options: Any,
 ) -> PathSolution:
     """Find the C1 geodesic path of a taut string from origin to insertion over a row of obstacles.
 
     origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
-    an earlier solution for the same obstacles elsewhere, whose branch (side, winding) is kept; tol: largest tangency
+    an earlier solution for the same obstacles elsewhere, or its `branch`: side and winding are kept; tol: largest tangency
     error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`), which
     ignore hints and may find a path that winds further than a string would.
     Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
