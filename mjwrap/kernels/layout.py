@@ -82,7 +82,8 @@ W_ANGLE = 109  # about the axis from P to Q [rad]; torus: how often the hole is 
 TWIN = 110  # 1 in the second row of a surface that a string may touch twice, 0 else
 W_LAST = 111  # the saved solution before a single wrap (9)
 W_FRESH = 120  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
-ROW = 128  # 16 cache lines
+W_BEST = 121  # the shortest solution that several cold starts have found (9)
+ROW = 136  # 17 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
 I_LENGTH = 0

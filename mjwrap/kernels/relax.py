@@ -23,12 +23,15 @@ SEARCH_EVERY = 6  # passes: a search costs as much as fifty wraps
 
 
 @jit
-def _following(k, hi, ends, node):
+def _following(k, hi, ends, node, centred):
     """Return the point at which the path meets what comes next after node k, relative to the base.
 
-    Before the first pass the hints of obstacles further on stand for their contact points.
+    Before the first pass the hints of obstacles further on stand for their contact points; `centred`: so does the centre of
+    the next one.
     """
     for j in range(k + 1, hi):
+        if centred and node[j, S_MODE] == COLD and node[j, HINT] <= 0.0:
+            return node[j, POS] - ends[0], node[j, POS + 1] - ends[1], node[j, POS + 2] - ends[2]
         if node[j, S_MODE] == TOUCHED:
             return node[j, W_P], node[j, W_P + 1], node[j, W_P + 2]
         if node[j, S_MODE] == COLD and node[j, HINT] > 0.0:
@@ -50,7 +53,7 @@ def _following(k, hi, ends, node):
 
 
 @jit
-def relax(lo, hi, ends, node, passes):
+def relax(lo, hi, ends, node, passes, centred=False):
     """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`.
 
     Lost contacts are searched for in some of the passes.
@@ -58,7 +61,7 @@ def relax(lo, hi, ends, node, passes):
     for i in range(passes):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
-            qx, qy, qz = _following(k, hi, ends, node)
+            qx, qy, qz = _following(k, hi, ends, node, centred)
             wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i % SEARCH_EVERY == 0)
             if node[k, S_MODE] == TOUCHED:
                 x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
@@ -127,7 +130,7 @@ def _between(lo, hi, first, last, ends, node):
         if node[j, S_MODE] == TOUCHED:
             ax, ay, az = node[j, W_Q], node[j, W_Q + 1], node[j, W_Q + 2]
             break
-    bx, by, bz = _following(last - 1, hi, ends, node)
+    bx, by, bz = _following(last - 1, hi, ends, node, False)
     return (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
 
 
@@ -163,4 +166,32 @@ def shorten(lo, hi, ends, node, passes):
         if not shorter or hi - lo == 1:
             break
         spent += relax(lo, hi, ends, node, passes)
+    return spent
+
+
+@jit
+def search_rows(lo, hi, ends, node, passes):
+    """Start a row without hints in three ways, shorten each, and leave the shortest; return the evaluations spent.
+
+    Between the ends, along the centres, and with the other side of everything that the first two have found.
+    """
+    spent = 0
+    best = math.inf
+    for start in range(3):
+        if start == 1:
+            for k in range(lo, hi):
+                node[k, S_MODE] = COLD
+        elif start == 2:
+            _other_way(lo, hi, node)
+        spent += relax(lo, hi, ends, node, passes, start == 1)
+        spent += shorten(lo, hi, ends, node, passes)
+        total = path_length(lo, hi, ends, node)
+        if total < best * (1.0 - 1e-9):
+            best = total
+            _keep(lo, hi, node, lay.W_BEST, False)
+        else:
+            _keep(lo, hi, node, lay.W_BEST, True)
+            for j in range(lo, hi):
+                if node[j, S_MODE] == TOUCHED:
+                    geodesic(j, node, ends[0], ends[1], ends[2])
     return spent

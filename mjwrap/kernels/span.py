@@ -16,7 +16,7 @@ from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.newton import newton
-from mjwrap.kernels.relax import path_length, relax, shorten
+from mjwrap.kernels.relax import path_length, relax, search_rows, shorten
 from mjwrap.kernels.shape import into_frame, project
 from mjwrap.kernels.touch import drop, follow_branch, in_range, join, split, take_in
 
@@ -52,6 +52,15 @@ def _passes(lo, hi, node):
         if not closed_form(node[k, lay.KIND]):
             return COLD_PASSES - 1
     return COLD_PASSES
+
+
+@jit
+def _all_hinted(lo, hi, node):
+    """Return whether hints choose the side of every obstacle."""
+    for k in range(lo, hi):
+        if node[k, HINT] <= 0.0 and node[k, lay.TWIN] == 0.0 and node[k, lay.KIND] != lay.SPHERE:
+            return False
+    return True
 
 
 @jit
@@ -147,10 +156,12 @@ def _solve(lo, hi, ends, node, tol, direct):
     error = 0.0
     status = lay.CONVERGED
     cold = _any(lo, hi, node, COLD)
-    if cold or (direct and hi - lo == 1):
+    if cold and hi - lo > 1 and not _all_hinted(lo, hi, node):
+        evaluations += search_rows(lo, hi, ends, node, COLD_PASSES)
+    elif cold or (direct and hi - lo == 1):
         evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node))
-        if cold and (hi - lo > 1 or closed_form(node[lo, lay.KIND])):
-            evaluations += shorten(lo, hi, ends, node, COLD_PASSES if hi - lo > 1 else 1)
+        if cold and hi - lo == 1 and closed_form(node[lo, lay.KIND]):
+            evaluations += shorten(lo, hi, ends, node, 1)
     _remember(lo, hi, node)
     fresh = -1.0
     if cold and hi - lo == 1 and not closed_form(node[lo, lay.KIND]):
