@@ -154,8 +154,8 @@ class EllipticCylinder(Surface):
 class Torus(Surface):
     """A ring about local z, in the plane of local x and y.
 
-    major_radius [m]: of the circle in the middle of the tube; minor_radius [m]: of the tube, smaller than the major one.
-    `GeometryError` for other sizes.
+    major_radius [m]: of the circle in the middle of the tube; minor_radius [m]: of the tube, smaller than the major
+    one. `GeometryError` for other sizes.
     """
 
     major_radius: float
@@ -185,7 +185,8 @@ class Torus(Surface):
 class Cone(Surface):
     """A circular cone about local z, or a tapered cylinder.
 
-    bottom_radius, top_radius [m]: at z = -half_length and z = half_length, not negative and not equal (the slope at least
+    bottom_radius, top_radius [m]: at z = -half_length and z = half_length, not negative and not equal (the slope at
+    least
     1e-3: use `Cylinder` instead); half_length [m], finite and positive: a range of validity, as of `Cylinder`, that
     never reaches beyond the apex. `GeometryError` for other sizes.
     """

@@ -23,7 +23,7 @@ config: Any = numba_config  # its variables, set from the environment, are not k
 njit: Any = numba.njit
 F = TypeVar("F", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
-_NOTICE = "mjwrap: compiling its kernels, once for this machine and version (10 to 20 s) ..."
+_NOTICE = "mjwrap: compiling its kernels, once for this machine and version (about half a minute) ..."
 
 
 def source_hash() -> str:

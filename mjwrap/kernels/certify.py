@@ -29,8 +29,8 @@ def branched(kind):
 def swept(k, node):
     """Return the angle that the path of the last evaluation sweeps, with sign [rad].
 
-    About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the middle of
-    a torus' tube.
+    About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the
+    middle of a torus' tube.
     """
     if node[k, KIND] == lay.CYLINDER:
         inverse = 1.0 / node[k, DIM]
@@ -40,9 +40,15 @@ def swept(k, node):
         return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
     px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
     size = -node[k, W_L]
-    ex, ey, ez = turn_into_frame(node, k, size * node[k, W_E], size * node[k, W_E + 1], size * node[k, W_E + 2])
+    ex, ey, ez = turn_into_frame(
+        node, k, size * node[k, W_E], size * node[k, W_E + 1], size * node[k, W_E + 2]
+    )
     ax, ay, az = px + ex, py + ey, pz + ez
-    dx, dy, dz = node[k, W_Q] - node[k, W_P], node[k, W_Q + 1] - node[k, W_P + 1], node[k, W_Q + 2] - node[k, W_P + 2]
+    dx, dy, dz = (
+        node[k, W_Q] - node[k, W_P],
+        node[k, W_Q + 1] - node[k, W_P + 1],
+        node[k, W_Q + 2] - node[k, W_P + 2],
+    )
     dx, dy, dz = turn_into_frame(node, k, dx, dy, dz)
     qx, qy, qz = px + dx, py + dy, pz + dz
     size = node[k, W_LQ]
@@ -60,7 +66,16 @@ def swept(k, node):
         )
     if node[k, KIND] == lay.ELLIPTIC_CYLINDER:
         ia, ib = 1.0 / node[k, DIM], 1.0 / node[k, DIM + 1]
-        ax, ay, px, py, qx, qy, bx, by = ia * ax, ib * ay, ia * px, ib * py, ia * qx, ib * qy, ia * bx, ib * by
+        ax, ay, px, py, qx, qy, bx, by = (
+            ia * ax,
+            ib * ay,
+            ia * px,
+            ib * py,
+            ia * qx,
+            ib * qy,
+            ia * bx,
+            ib * by,
+        )
     return (
         math.atan2(ax * py - ay * px, ax * px + ay * py)
         + node[k, W_ANGLE]
@@ -75,8 +90,8 @@ def minimal(lo, hi, node):
     At a tangent path the second variation lives in sideways shifts x b_P, y b_Q of the contact points alone:
     straight segments add |x b_P - y b_Q|^2 / L, geodesics (a x^2 - 2 x y + r' y^2) / r. Eliminated from the origin
     on, its pivots are a Riccati recursion in the stiffness c behind each point: the Jacobi field a + c r must stay
-    positive along every geodesic, and 1/L + c at every point that a straight segment leaves. Off the surface, the string
-    must not gain by lifting off: its normal curvature is nowhere negative.
+    positive along every geodesic, and 1/L + c at every point that a straight segment leaves. Off the surface, the
+    string must not gain by lifting off: its normal curvature is nowhere negative.
     """
     last = -1
     c = 0.0
@@ -111,9 +126,11 @@ def minimal(lo, hi, node):
 
 @jit
 def slip(lo, hi, node, size):
-    """Write to columns W_Y + 1, W_Y + 2 a sideways variation (d1, d2) by which the path of the last evaluation shortens.
+    """Write to columns W_Y + 1, W_Y + 2 a sideways variation (d1, d2) by which the path of the last evaluation
+    shortens.
 
-    The second variation's pivots, as in `minimal`, with the shifts x, y of P and Q for unknowns; the first pivot that is
+    The second variation's pivots, as in `minimal`, with the shifts x, y of P and Q for unknowns; the first pivot that
+    is
     not positive gives a direction of negative curvature, up to that obstacle. Scaled to `size`, in radii. Returns the
     obstacle, or -1 where there is none.
     """

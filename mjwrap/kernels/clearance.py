@@ -17,6 +17,7 @@ KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
 SPACING = 0.4  # of the smallest radius of curvature: between samples of a surface that is not convex
 MOST_SAMPLES = 200
 REFINEMENTS = 25  # of a dip between samples, by the golden section
+EDGE = 1e-3  # of the spacing: how near to the ends of a segment a dip is looked for
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
@@ -77,13 +78,21 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
     step = (last - first) / count
     best, lowest = first, _along(node, k, first, ax, ay, az, dx, dy, dz)
     before, here = lowest, lowest
-    for i in range(1, count + 1):
+    for i in range(1, count + 2):
         share = first + i * step
-        after = _along(node, k, share, ax, ay, az, dx, dy, dz)
+        after = math.inf  # beyond the ends: a dip may lie next to one
+        if i <= count:
+            after = _along(node, k, share, ax, ay, az, dx, dy, dz)
         if after < lowest:
             best, lowest = share, after
-        if i > 1 and here <= before and here <= after and here < lowest + step * size:
-            lo, hi = share - 2.0 * step, share
+        beside = (
+            i == 1 and after > here and _along(node, k, first + EDGE * step, ax, ay, az, dx, dy, dz) < here
+        )
+        if i > count and before > here:
+            beside = _along(node, k, last - EDGE * step, ax, ay, az, dx, dy, dz) < here
+        inner = 1 < i <= count and here <= before and here <= after
+        if beside or (inner and here < lowest + step * size):
+            lo, hi = max(share - 2.0 * step, first), min(share, last)
             one, two = hi - GOLDEN * (hi - lo), lo + GOLDEN * (hi - lo)
             h_one = _along(node, k, one, ax, ay, az, dx, dy, dz)
             h_two = _along(node, k, two, ax, ay, az, dx, dy, dz)
@@ -104,7 +113,9 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
 
 @jit
 def bounding_radius(node, k):
-    """Return the radius of a sphere about the origin of S that holds the surface; infinite where it is not known [m]."""
+    """Return the radius of a sphere about the origin of S that holds the surface; infinite where it is not known
+    [m].
+    """
     kind = node[k, KIND]
     if kind == lay.SPHERE or kind == lay.CUSTOM:
         return node[k, DIM]

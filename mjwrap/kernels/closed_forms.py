@@ -29,9 +29,7 @@ def cylinder(k, node):
     c, d = math.cos(angle), math.sin(angle)
     mx, my = c * nx - d * ny, d * nx + c * ny
     put_start(node, k, radius * nx, radius * ny, z, tx, ty, tz, nx, ny, 0.0)
-    put_end(
-        node, k, radius * mx, radius * my, z + s * tz, c * tx - d * ty, d * tx + c * ty, tz, mx, my, 0.0
-    )
+    put_end(node, k, radius * mx, radius * my, z + s * tz, c * tx - d * ty, d * tx + c * ty, tz, mx, my, 0.0)
     kappa, tau, beta = around * around * inverse, around * tz * inverse, tz * tz * inverse
     put_curvature(node, k, W_KP, kappa, tau, beta)
     put_curvature(node, k, W_KQ, kappa, tau, beta)
@@ -206,6 +204,4 @@ def _put_capsule(node, k, column, half, inverse, z, nx, ny, nz, tx, ty, tz):
         put_curvature(node, k, column, inverse, 0.0, inverse)
         return
     around = nx * ty - ny * tx
-    put_curvature(
-        node, k, column, around * around * inverse, around * tz * inverse, tz * tz * inverse
-    )
+    put_curvature(node, k, column, around * around * inverse, around * tz * inverse, tz * tz * inverse)

@@ -1,7 +1,9 @@
 """Wraps of one obstacle between two given points: cold starts, touchdown and the test for it.
 
-Closed forms where there are any (`ruled.py`, and the sphere here: its shorter way is the only stable one), a search with Newton's
-method elsewhere (`search.py`). Every function takes the points A (before) and B (after) and writes the obstacle's row of
+Closed forms where there are any (`ruled.py`, and the sphere here: its shorter way is the only stable one), a search
+with Newton's
+method elsewhere (`search.py`). Every function takes the points A (before) and B (after) and writes the obstacle's row
+of
 `node`. It returns 0, plus A_INSIDE, plus B_INSIDE where the point lies inside the surface (it is then taken as on it),
 plus SLIPPED.
 """
@@ -107,8 +109,8 @@ def closed_form(kind):
 def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
 
-    Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED summed, or 0.
-    search: look for another side where a contact is lost, on surfaces without a closed form.
+    Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED
+    summed, or 0. search: look for another side where a contact is lost, on surfaces without a closed form.
     """
     kind = node[k, KIND]
     if not closed_form(kind):

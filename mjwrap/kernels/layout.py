@@ -30,7 +30,7 @@ ELLIPTIC_CYLINDER = 4  # DIM: two semi-axes, half length
 TORUS = 5  # DIM: major radius, minor radius
 CONE = 6  # DIM: radius at z = 0, slope (radius gained per length along z), half length
 CAPSULE = 7  # DIM: radius, half length of the cylinder
-CUSTOM = 8  # DIM: radius about the origin that holds it (inf: unbounded), then three addresses of compiled functions, see `custom.py`
+CUSTOM = 8  # DIM: radius about the origin that holds it (inf: unbounded), three addresses, see `custom.py`
 
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0
@@ -81,7 +81,9 @@ W_RMIN = 108  # smallest of r over the arc so far: <= 0 behind a conjugate point
 W_ANGLE = 109  # about the axis from P to Q [rad]; torus: how often the hole is passed; CUSTOM: 1 out of range, else 0
 TWIN = 110  # 1 in the second row of a surface that a string may touch twice, 0 else
 W_LAST = 111  # the saved solution before a single wrap (9)
-W_FRESH = 120  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
+W_FRESH = (
+    120  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
+)
 W_BEST = 121  # the shortest solution that several cold starts have found (9)
 ROW = 136  # 17 cache lines
 

@@ -12,6 +12,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geodesics import displace, geodesic
+from mjwrap.kernels.shape import into_frame, project
 
 S_MODE, S_P, S_ARC = lay.S_MODE, lay.S_P, lay.S_ARC
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
@@ -21,7 +22,10 @@ SIZE = lay.SIZE
 W_Y, W_X, W_SAVE = lay.W_Y, lay.W_X, lay.W_SAVE
 TOUCHED = lay.TOUCHED
 
-ON_SURFACE = 2e-9  # a straight segment shorter than this share of the radius ends on the surface, no tangent is shorter
+ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
+LAST = 2e-9  # the same at the path's last point, where nothing pins the contact
+PINNED = 1e-11  # a contact nearer than this share of the size to an end on the surface is at it
+NOISE = 4e-16  # rounding of a point [m]: over a segment's length it bounds what its direction can say
 MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in radii
 MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in radii
@@ -41,7 +45,9 @@ def _dot(node, j, left, k, right):
 
 @jit
 def _leave(j, ex, ey, ez, size, ends, node):
-    """Enter the straight segment that leaves obstacle j; return its share of ||f||^2, none where the path ends there."""
+    """Enter the straight segment that leaves obstacle j; return its share of ||f||^2, none where the path ends
+    there.
+    """
     node[j, W_EQ] = ex
     node[j, W_EQ + 1] = ey
     node[j, W_EQ + 2] = ez
@@ -57,7 +63,14 @@ def _leave(j, ex, ey, ez, size, ends, node):
     node[j, W_CQ] = along
     node[j, W_CQ + 1] = normal
     node[j, W_CQ + 2] = binormal
-    return (1.0 - along) ** 2 + normal * normal + binormal * binormal
+    return _share(along, normal, binormal, size)
+
+
+@jit
+def _share(along, normal, binormal, size):
+    """Return one end's share of ||f||^2; nothing where the segment is so short that its direction says no more."""
+    share = (1.0 - along) ** 2 + normal * normal + binormal * binormal
+    return share if share * size * size > NOISE * NOISE else 0.0
 
 
 @jit
@@ -77,7 +90,9 @@ def evaluate(lo, hi, ends, node):
         dx, dy, dz = node[k, W_P] - x, node[k, W_P + 1] - y, node[k, W_P + 2] - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
         short = size <= ON_SURFACE * node[k, SIZE]
-        if short and last >= 0:  # two contacts meet: where they do not go on into each other there is a corner
+        if (
+            short and last >= 0
+        ):  # two contacts meet: where they do not go on into each other there is a corner
             dx, dy, dz = (
                 node[last, W_TQ] + node[k, W_TP],
                 node[last, W_TQ + 1] + node[k, W_TP + 1],
@@ -99,7 +114,7 @@ def evaluate(lo, hi, ends, node):
         node[k, W_CP] = along
         node[k, W_CP + 1] = normal
         node[k, W_CP + 2] = binormal
-        total += (1.0 - along) ** 2 + normal * normal + binormal * binormal
+        total += _share(along, normal, binormal, size)
         if last >= 0:
             total += _leave(last, dx, dy, dz, size, False, node)
         x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
@@ -108,7 +123,7 @@ def evaluate(lo, hi, ends, node):
         dx, dy, dz = bx - x, by - y, bz - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
         inverse = 1.0 / (size + SHORTEST)
-        short = size <= ON_SURFACE * node[last, SIZE]
+        short = size <= LAST * node[last, SIZE]
         total += _leave(last, dx * inverse, dy * inverse, dz * inverse, size, short, node)
     return total
 
@@ -261,17 +276,42 @@ def _move(lo, hi, share, node):
 
 
 @jit
+def _pin(lo, hi, ends, node):
+    """Where the path starts on the surface that it meets first, start the geodesic there; return whether it did.
+
+    The straight segment has no direction then: the contact stays, and what is left to solve for is the other end.
+    """
+    for k in range(lo, hi):
+        if node[k, S_MODE] != TOUCHED:
+            continue
+        size = node[k, SIZE]
+        if node[k, W_L] > ON_SURFACE * size or node[k, W_L] <= PINNED * size:
+            return False
+        x, y, z = into_frame(node, k, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5])
+        x, y, z, _, _, _ = project(node, k, x, y, z)
+        node[k, S_P] = x
+        node[k, S_P + 1] = y
+        node[k, S_P + 2] = z
+        displace(k, 0.0, 0.0, 0.0, 0.0, node)
+        return True
+    return False
+
+
+@jit
 def newton(lo, hi, ends, node, tol, max_iterations, square=-1.0):
     """Iterate until ||f|| <= tol; return (||f||, iterations, evaluations), the last state left in `state`.
 
-    square: ||f||^2 where the rows hold the evaluation of their start, else negative. A step that does not reduce ||f|| is
-    halved; the iteration stops where halving does not help.
+    square: ||f||^2 where the rows hold the evaluation of their start, else negative. A step that does not reduce
+    ||f|| is halved; the iteration stops where halving does not help.
     """
     evaluations = 0
     if square < 0.0:
         square = evaluate(lo, hi, ends, node)
         evaluations = 1
     iterations = 0
+    if _pin(lo, hi, ends, node):
+        square = evaluate(lo, hi, ends, node)
+        evaluations += 1
     while square > tol * tol and iterations < max_iterations and math.isfinite(square):
         if not step(lo, hi, node):
             break
@@ -290,4 +330,7 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=-1.0):
         if not trial < square:
             break
         square = trial
+        if _pin(lo, hi, ends, node):
+            square = evaluate(lo, hi, ends, node)
+            evaluations += 1
     return math.sqrt(square), iterations, evaluations

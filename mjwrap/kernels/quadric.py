@@ -1,15 +1,16 @@
-"""Geodesics of the ellipsoid and of the elliptic cylinder x^2/a^2 + y^2/b^2 + z^2/c^2 = 1 (1/c = 0), in the embedding space.
+"""Geodesics of the ellipsoid and of the elliptic cylinder x^2/a^2 + y^2/b^2 + z^2/c^2 = 1 (1/c = 0), in the embedding
+space.
 
-With g = (x/a^2, y/b^2, z/c^2), half the gradient, S = g.g and T = t.A t, A = diag(1/a^2, 1/b^2, 1/c^2), the geodesic obeys
+With g = (x/a^2, y/b^2, z/c^2), half the gradient, S = g.g and T = t.A t, A = diag(1/a^2, 1/b^2, 1/c^2), the geodesic
+obeys
 p'' = -(T/S) g, and Joachimsthal's integral C = T S is constant along it. So p'' = -(C/S^2) g and K = det A / S^2 depend
-on the position alone: an equation for Stoermer's rule, which carries p and both Jacobi fields with one division a stage.
+on the position alone: an equation for Stoermer's rule, which carries p and both Jacobi fields with one division a
+stage.
 """
 
 from __future__ import annotations
 
 import math
-
-from numba import carray
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
@@ -25,6 +26,7 @@ from mjwrap.kernels.stoermer import (
     SHRINK,
     TOLERANCE,
     WEIGHT,
+    carray,
     combine,
     stack,
 )

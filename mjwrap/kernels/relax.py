@@ -26,8 +26,8 @@ SEARCH_EVERY = 6  # passes: a search costs as much as fifty wraps
 def _following(k, hi, ends, node, centred):
     """Return the point at which the path meets what comes next after node k, relative to the base.
 
-    Before the first pass the hints of obstacles further on stand for their contact points; `centred`: so does the centre of
-    the next one.
+    Before the first pass the hints of obstacles further on stand for their contact points; `centred`: so does the
+    centre of the next one.
     """
     for j in range(k + 1, hi):
         if centred and node[j, S_MODE] == COLD and node[j, HINT] <= 0.0:
@@ -138,9 +138,10 @@ def _between(lo, hi, first, last, ends, node):
 def shorten(lo, hi, ends, node, passes):
     """Try other sides for all obstacles without a hint; keep what is shorter.
 
-    Sides known in closed form change in runs of up to MOST_FLIPS neighbours together; others are searched for anew, one at a
-    time, between the contacts that their neighbours have now. The path WINDOW obstacles to both sides is free to follow. Until
-    nothing gets shorter: a local search, at cold starts only. Returns the evaluations spent.
+    Sides known in closed form change in runs of up to MOST_FLIPS neighbours together; others are searched for anew,
+    one at a
+    time, between the contacts that their neighbours have now. The path WINDOW obstacles to both sides is free to
+    follow. Until nothing gets shorter: a local search, at cold starts only. Returns the evaluations spent.
     """
     spent = 0
     for _ in range(SWEEPS):

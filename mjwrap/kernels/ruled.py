@@ -3,8 +3,8 @@
 The side on which a string passes them is a matter of topology. It is held by the angle that the string sweeps
 about the axis from A to B, a real number that follows the motion continuously: modulo 2 pi it is known from the pose,
 and the saved value says which multiple is meant. The string touches where the swept angle exceeds what straight
-tangents from A and B leave free. An elliptic cylinder is treated in the affine image in which it is a circular one; a string that
-leaves a cone over its apex is free.
+tangents from A and B leave free. An elliptic cylinder is treated in the affine image in which it is a circular one; a
+string that leaves a cone over its apex is free.
 """
 
 from __future__ import annotations
@@ -107,7 +107,9 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
 
 @jit
 def _sweep(k, node, ax, ay, bx, by, alpha_a, alpha_b, hint_x, hint_y, radius):
-    """Return the angle that the string sweeps about the axis: the saved branch's, the hint's or the shorter one [rad]."""
+    """Return the angle that the string sweeps about the axis: the saved branch's, the hint's or the shorter one
+    [rad].
+    """
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     if node[k, S_MODE] != lay.COLD:
         return follow(sweep, node[k, S_SWEEP])
@@ -136,9 +138,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     root_a = math.sqrt(max(square_a - square, 0.0))
     root_b = math.sqrt(max(square_b - square, 0.0))
     alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
-    sweep = _sweep(
-        k, node, ax, ay, bx, by, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], radius
-    )
+    sweep = _sweep(k, node, ax, ay, bx, by, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], radius)
     arc = abs(sweep) - alpha_a - alpha_b
     if arc <= CLEAR:
         set_free(node, k, sweep)
@@ -218,7 +218,9 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
 @jit
 def _tangent_ruling(rho, reach):
     """Return the angle between A and the rulings that its tangent planes touch, and its distance from them."""
-    if rho <= abs(reach):  # inside, or inside the mirrored cone beyond the apex, where no tangent plane exists
+    if rho <= abs(
+        reach
+    ):  # inside, or inside the mirrored cone beyond the apex, where no tangent plane exists
         return (0.0 if reach > 0.0 else math.pi), 0.0
     root = math.sqrt((rho - reach) * (rho + reach))
     return math.atan2(root, reach), root
@@ -242,19 +244,21 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     sweep = _sweep(
         k, node, ax, ay, bx, by, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], max(reach_a, reach_b)
     )
-    arc = abs(sweep) - alpha_a - alpha_b
-    if arc <= CLEAR:
-        set_free(node, k, sweep)
-        return inside
     # along the ruling from the apex: m = reach (sine + cosine^2 / sine) = reach / sine on the surface and off it
     along_a = max(reach_a, 0.0) / sine if root_a == 0.0 else reach_a / sine
     along_b = max(reach_b, 0.0) / sine if root_b == 0.0 else reach_b / sine
-    delta_a = math.atan2(root_a, along_a)
-    total = delta_a + arc * sine + math.atan2(root_b, along_b)
-    if total >= math.pi:
-        wound = node[k, S_MODE] == lay.TOUCHED and abs(node[k, S_SWEEP]) > math.pi
-        set_free(node, k, principal)
-        return inside | SLIPPED if wound else inside
+    delta_a, delta_b = math.atan2(root_a, along_a), math.atan2(root_b, along_b)
+    arc = abs(sweep) - alpha_a - alpha_b
+    if delta_a + arc * sine + delta_b >= math.pi and abs(sweep) > math.pi:
+        if node[k, S_MODE] != lay.COLD and abs(node[k, S_SWEEP]) > math.pi:
+            set_free(node, k, sweep)
+            return inside | SLIPPED
+        sweep = principal  # a free string that passes beyond the apex, or a hint that asks for what cannot be
+        arc = abs(sweep) - alpha_a - alpha_b
+    total = delta_a + arc * sine + delta_b
+    if arc <= CLEAR or total >= math.pi:
+        set_free(node, k, sweep)
+        return inside
     turn = 1.0 if sweep >= 0.0 else -1.0
     if root_a > 0.0:
         nx, ny = _contact_normal(ax, ay, reach_a, root_a, turn)

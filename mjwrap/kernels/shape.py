@@ -1,7 +1,7 @@
 """Where surfaces are: nearest point and normal, signed height, and how deep a straight segment dips.
 
-Everything in the frame S of the obstacle. The height is negative inside, positive outside, and to first order the distance
-where it is small.
+Everything in the frame S of the obstacle. The height is negative inside, positive outside, and to first order the
+distance where it is small.
 """
 
 from __future__ import annotations

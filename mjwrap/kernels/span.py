@@ -15,7 +15,7 @@ from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.geodesics import displace, geodesic
-from mjwrap.kernels.newton import newton
+from mjwrap.kernels.newton import ON_SURFACE, newton
 from mjwrap.kernels.relax import path_length, relax, search_rows, shorten
 from mjwrap.kernels.shape import into_frame, project
 from mjwrap.kernels.touch import drop, follow_branch, in_range, join, split, take_in
@@ -130,6 +130,24 @@ def _outside(lo, hi, ends, node, column):
 
 
 @jit
+def _end_inside(lo, hi, ends, node):
+    """Return whether an end of the span lies inside an obstacle."""
+    return _outside(lo, hi, ends, node, 3)[0] or _outside(lo, hi, ends, node, 6)[0]
+
+
+@jit
+def _ends_short(lo, hi, node):
+    """Return whether the path's first or last straight segment is so short that the end may lie inside the surface."""
+    last = -1
+    for k in range(lo, hi):
+        if node[k, S_MODE] == TOUCHED:
+            if last < 0 and node[k, lay.W_L] <= ON_SURFACE * node[k, lay.SIZE]:
+                return True
+            last = k
+    return last >= 0 and node[last, lay.W_LQ] <= ON_SURFACE * node[last, lay.SIZE]
+
+
+@jit
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
@@ -205,13 +223,14 @@ def _solve(lo, hi, ends, node, tol, direct):
         repairs += 1
         changes = 0
     if not settled:
-        inside = _outside(lo, hi, ends, node, 3)[0] or _outside(lo, hi, ends, node, 6)[0]
-        if inside:
+        if _end_inside(lo, hi, ends, node):
             status = lay.ENDPOINT_INSIDE
         elif status != lay.NOT_MINIMAL:
             _, status = take_in(lo, hi, ends, node)
             if status == lay.CONVERGED:
                 status = lay.NOT_CONVERGED
+    elif status == lay.CONVERGED and _ends_short(lo, hi, node) and _end_inside(lo, hi, ends, node):
+        status = lay.ENDPOINT_INSIDE
     elif status == lay.CONVERGED and not in_range(lo, hi, ends, node):
         status = lay.OUT_OF_RANGE
     for k in range(lo, hi):

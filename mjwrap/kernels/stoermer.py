@@ -1,8 +1,11 @@
-"""Stoermer's rule, extrapolated, for y'' = f(y): order 16 from eight columns of 1 to 8 substeps, side by side in SIMD lanes.
+"""Stoermer's rule, extrapolated, for y'' = f(y): order 16 from eight columns of 1 to 8 substeps, side by side in SIMD
+lanes.
 
 One large step of length H is done eight times over, with 1, 2, ..., 8 substeps; the errors have even powers of the
-substep only, so that fixed weights on the eight results cancel all but H^17 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations
-I, II.14). The columns are independent: they fill the lanes of the vector unit, which makes a step of order 16 as long as
+substep only, so that fixed weights on the eight results cancel all but H^17 (Hairer, Norsett, Wanner, Solving
+Ordinary Differential Equations
+I, II.14). The columns are independent: they fill the lanes of the vector unit, which makes a step of order 16 as long
+as
 eight evaluations of f. The result without the last column is of order 14; the difference bounds the error. The surfaces
 write the rule out with their own f; lanes 0..3 are done after four rounds.
 """
@@ -13,6 +16,7 @@ import collections
 import ctypes
 from typing import Any
 
+import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -41,26 +45,28 @@ TOLERANCE = 1e-11  # of the estimate: the error of a step is then below 1e-12, m
 SHRINK = 1.0 / 15.0  # power by which a rejected step shrinks
 MAX_STEPS = 200  # of one geodesic, rejected ones included
 
-if config.DISABLE_JIT:
-    _recent: collections.deque[Any] = collections.deque(maxlen=64)  # `carray` does not hold its memory
+_recent: collections.deque[Any] = collections.deque(maxlen=64)
 
-    def stack() -> Any:
-        """Return a pointer to ROWS x LANES doubles, which live until 64 more have been asked for."""
-        memory = (ctypes.c_double * (ROWS * LANES))()
-        _recent.append(memory)
-        return ctypes.cast(memory, ctypes.POINTER(ctypes.c_double))
 
-else:
+def _plain_stack() -> Any:
+    """Return a pointer to ROWS x LANES doubles, which live until 64 more have been asked for (uncompiled kernels)."""
+    memory = (ctypes.c_double * (ROWS * LANES))()
+    _recent.append(memory)  # `carray` does not hold its memory
+    return ctypes.cast(memory, ctypes.POINTER(ctypes.c_double))
 
-    @intrinsic
-    def stack(typing_context: Any) -> Any:
-        """Return a pointer to ROWS x LANES doubles on the caller's stack: no allocation, and nothing can alias them."""
 
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            kind = ir.ArrayType(ir.DoubleType(), ROWS * LANES)
-            return builder.bitcast(cgutils.alloca_once(builder, kind), ir.DoubleType().as_pointer())
+def _stack(typing_context: Any) -> Any:
+    """Return a pointer to ROWS x LANES doubles on the caller's stack: no allocation, and nothing can alias them."""
 
-        return types.CPointer(types.float64)(), generate
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.ArrayType(ir.DoubleType(), ROWS * LANES)
+        return builder.bitcast(cgutils.alloca_once(builder, kind), ir.DoubleType().as_pointer())
+
+    return types.CPointer(types.float64)(), generate
+
+
+stack: Any = _plain_stack if config.DISABLE_JIT else intrinsic(_stack)
+carray: Any = getattr(numba, "carray")  # noqa: B009, not declared for type checkers
 
 
 @jit

@@ -1,7 +1,8 @@
 """Geodesics of the torus with major radius R and minor radius r, in its meridian plane.
 
 With rho the distance from the axis and c = rho^2 u' Clairaut's constant, q = c^2/rho^2 and the normal curvature
-kappa = (1 - q)/r + q cos v / rho, the geodesic obeys rho'' = q/rho - kappa cos v, z'' = -kappa sin v, and K = cos v / (r rho):
+kappa = (1 - q)/r + q cos v / rho, the geodesic obeys rho'' = q/rho - kappa cos v, z'' = -kappa sin v, and K = cos v /
+(r rho):
 forces that depend on the position alone, without angles, for Stoermer's rule. The angle u about the axis is c times the
 integral of 1/rho^2, by the trapezoidal rule on the same substeps, extrapolated alike.
 """
@@ -10,12 +11,21 @@ from __future__ import annotations
 
 import math
 
-from numba import carray
-
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.frames import put_curvature, put_end, put_fields, put_start
-from mjwrap.kernels.stoermer import DOUBT, INVERSE, LANES, MAX_STEPS, ROWS, SHRINK, TOLERANCE, WEIGHT, stack
+from mjwrap.kernels.stoermer import (
+    DOUBT,
+    INVERSE,
+    LANES,
+    MAX_STEPS,
+    ROWS,
+    SHRINK,
+    TOLERANCE,
+    WEIGHT,
+    carray,
+    stack,
+)
 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
 STEP = 0.8  # first step tried, in units of the local length scale
@@ -33,7 +43,9 @@ def _force(rho, z, major, ir, c2):
 
 @jit
 def _substep(v, first, last, k, hh, p, z, a, r, major, ir, c2):
-    """Take substep k of the columns first..last: increments in rows 0..3 of v, their differences in 4..7, the sum in 8."""
+    """Take substep k of the columns first..last: increments in rows 0..3 of v, their differences in 4..7, the sum in
+    8.
+    """
     for i in range(first, last):
         fp, fz, d, w = _force(p + v[0, i], z + v[1, i], major, ir, c2)
         on = 0.0 if k > i else 1.0

@@ -18,7 +18,9 @@ FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
 MET = 1e-5  # contacts on both sides of a hollow that are so near, in the surface's size, have met
 PIECES = 24  # of a geodesic, to find where it runs through a hollow
-DEPTH = -1e-9  # a segment that dips less below the surface that it leaves or meets, in its size, only touches it
+DEPTH = (
+    -1e-9
+)  # a segment that dips less below the surface that it leaves or meets, in its size, only touches it
 
 
 @jit
@@ -101,7 +103,8 @@ def _hand_over(k, node):
 
 @jit
 def split(lo, hi, ends, node):
-    """Where a geodesic runs through a hollow that the string would bridge, give its far part to the surface's second row.
+    """Where a geodesic runs through a hollow that the string would bridge, give its far part to the surface's second
+    row.
 
     Returns how many contacts were split.
     """
@@ -125,7 +128,11 @@ def split(lo, hi, ends, node):
             continue
         node[k, S_ARC] = arc * (last + 1) / PIECES
         geodesic(k, node, ends[0], ends[1], ends[2])
-        x, y, z = node[k, W_Q] - node[k, W_P], node[k, W_Q + 1] - node[k, W_P + 1], node[k, W_Q + 2] - node[k, W_P + 2]
+        x, y, z = (
+            node[k, W_Q] - node[k, W_P],
+            node[k, W_Q + 1] - node[k, W_P + 1],
+            node[k, W_Q + 2] - node[k, W_P + 2],
+        )
         x, y, z = turn_into_frame(node, k, x, y, z)
         tx, ty, tz = turn_into_frame(node, k, node[k, lay.W_TQ], node[k, lay.W_TQ + 1], node[k, lay.W_TQ + 2])
         node[k + 1, S_MODE] = TOUCHED
@@ -219,7 +226,11 @@ def in_range(lo, hi, ends, node):
         elif kind == lay.CONE or kind == lay.ELLIPTIC_CYLINDER:
             half = node[k, DIM + 2]
         if half < 1e300:
-            x, y, z = node[k, W_Q] - node[k, W_P], node[k, W_Q + 1] - node[k, W_P + 1], node[k, W_Q + 2] - node[k, W_P + 2]
+            x, y, z = (
+                node[k, W_Q] - node[k, W_P],
+                node[k, W_Q + 1] - node[k, W_P + 1],
+                node[k, W_Q + 2] - node[k, W_P + 2],
+            )
             _, _, rise = turn_into_frame(node, k, x, y, z)
             if abs(node[k, S_P + 2]) > half or abs(node[k, S_P + 2] + rise) > half:
                 return False

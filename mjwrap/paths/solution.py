@@ -21,8 +21,8 @@ class Contact:
     """Where a path touches one obstacle.
 
     active: whether it does; P, Q (3,): first and last contact point, world [m] (None where not active);
-    arc_length: of the geodesic from P to Q [m]; second: where the string touches the same surface again, behind a hollow
-    that it bridges (through the air over a torus' hole), else None. A via point is always active, with P = Q.
+    arc_length: of the geodesic from P to Q [m]; second: where the string touches the same surface again, behind a
+    hollow that it bridges (through the air over a torus' hole), else None. A via point is always active, with P = Q.
     """
 
     active: bool
@@ -92,7 +92,8 @@ class PathSolution(Derivatives):
     def branch(self) -> Array:
         """What a warm start keeps of this path, a copy, (rows, 9), one row per obstacle, two for one with hollows.
 
-        Columns: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc length [m], in the surface's
+        Columns: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc length [m], in the
+        surface's
         frame. `solve_path(start=branch)` with the same pose gives the same bits whatever was solved in between.
         """
         return self._saved.copy()

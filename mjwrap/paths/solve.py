@@ -20,12 +20,15 @@ def _start(start: PathSolution | Array | None, node: Array) -> None:
     if isinstance(start, np.ndarray):
         if start.shape != (len(node), layout.STATE) or not np.isfinite(start).all():
             raise GeometryError(
-                f"start must be a finite branch of shape ({len(node)}, {layout.STATE}) for these obstacles, not {start.shape}"
+                f"start must be a finite branch of shape ({len(node)}, {layout.STATE}) for these obstacles, "
+                f"not {start.shape}"
             )
         node[:, SAVED] = start
         return
     if not isinstance(start, PathSolution):
-        raise GeometryError(f"start must be the PathSolution of an earlier solve, or its branch, not {start!r}")
+        raise GeometryError(
+            f"start must be the PathSolution of an earlier solve, or its branch, not {start!r}"
+        )
     if not np.array_equal(start._node[:, layout.KIND], node[:, layout.KIND]):
         raise GeometryError("start belongs to a path over other obstacles: number and kinds must be the same")
     node[:, SAVED] = start._saved
@@ -44,7 +47,8 @@ def solve_path(
     """Find the C1 geodesic path of a taut string from origin to insertion over a row of obstacles.
 
     origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
-    an earlier solution for the same obstacles elsewhere, or its `branch`: side and winding are kept; tol: largest tangency
+    an earlier solution for the same obstacles elsewhere, or its `branch`: side and winding are kept; tol: largest
+    tangency
     error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`), which
     ignore hints and may find a path that winds further than a string would.
     Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
@@ -63,7 +67,7 @@ def solve_path(
         direct = start is None
         chain.solve_chain(*solution._ends, node, float(tol), direct, info, 0)
     else:
-        _solve_with(method, here, there, obstacles, node, start, float(tol), options, info)
+        _solve_with(method, here, there, obstacles, node, start is not None, float(tol), options, info)
     solution._finish(info[0], before)
     return solution
 
@@ -74,7 +78,7 @@ def _solve_with(
     insertion: Point,
     obstacles: Sequence[Obstacle | ViaPoint],
     node: Array,
-    start: PathSolution | None,
+    warm: bool,
     tol: float,
     options: dict[str, Any],
     info: Array,
@@ -91,7 +95,7 @@ def _solve_with(
         there = np.array(insertion) if stop == len(obstacles) else np.array(obstacles[stop].pos)
         if stop > first:
             result = _solve_span_with(
-                method, here, there, obstacles[first:stop], node[first:stop], start is not None, tol, options
+                method, here, there, obstacles[first:stop], node[first:stop], warm, tol, options
             )
             good = good and result.converged
             iterations += result.iterations
