@@ -175,7 +175,7 @@ def test_what_else_starts_a_new_cache(tmp_path: Path, monkeypatch: pytest.Monkey
     hashes.append(_jit.source_hash())
     for path in (PACKAGE / "kernels").glob("*.py"):
         shutil.copy(path, tmp_path)
-    (tmp_path / "torus.py").touch()
+    (tmp_path / "another_surface.py").touch()
     monkeypatch.setattr(_jit, "_HERE", tmp_path)
     hashes.append(_jit.source_hash())
     assert len(set(hashes)) == len(hashes)
