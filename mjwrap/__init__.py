@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         fit_torus,
         mesh_points,
     )
-    from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle, PathActuator
+    from mjwrap.muscles import DeGrooteFregly2016, Millard2012, MuJoCoMuscle, PathActuator
     from mjwrap.paths import (
         Contact,
         Obstacle,
@@ -73,6 +73,7 @@ _HOMES = {
     "fit_torus": "fitting",
     "mesh_points": "fitting",
     "DeGrooteFregly2016": "muscles",
+    "Millard2012": "muscles",
     "MuJoCoMuscle": "muscles",
     "PathActuator": "muscles",
     "MuscleSystem": "system",
@@ -90,6 +91,7 @@ __all__ = [
     "Fit",
     "GeometryError",
     "ImplicitSurface",
+    "Millard2012",
     "MjwrapError",
     "ModelError",
     "MuJoCoMuscle",

@@ -10,7 +10,13 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from mjwrap.errors import ModelError
-from mjwrap.kernels import muscle
+from mjwrap.kernels import degroote_fregly, millard, muscle
+
+TENDONS = ("rigid", "elastic")
+# Below this [l_o] an elastic tendon is rigid: at maximum isometric force it would stretch by 5e-6 l_o, which changes
+# a fibre's force by about 1e-5 of that, while its stiffness grows without bound.
+SHORTEST_TENDON = 1e-4
+LEAST_COSINE = 0.1  # of the pennation angle, at the shortest fibre length (Millard et al. 2013)
 
 
 class Law(Protocol):
@@ -18,6 +24,11 @@ class Law(Protocol):
 
     code: ClassVar[int]
     law: ClassVar[str]
+
+    @property
+    def states(self) -> int:
+        """Return how many states the law has of activation and fibre length, in this order: 0, 1 or 2."""
+        ...
 
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of the kernel's section."""
@@ -34,13 +45,51 @@ def _positive(law: Law, **values: float) -> None:
         _require(law, math.isfinite(value) and value > 0.0, name, value, "finite and positive")
 
 
+def _check_fiber(law: DeGrooteFregly2016 | Millard2012) -> None:
+    """Raise `ModelError` where a law with a fibre has sizes without sense."""
+    _positive(
+        law,
+        max_isometric_force=law.max_isometric_force,
+        optimal_fiber_length=law.optimal_fiber_length,
+        max_contraction_velocity=law.max_contraction_velocity,
+    )
+    slack, angle, damping = law.tendon_slack_length, law.pennation_angle, law.damping
+    _require(law, math.isfinite(slack) and slack >= 0.0, "tendon_slack_length", slack, "finite and >= 0 [m]")
+    _require(law, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
+    _require(law, math.isfinite(damping) and damping >= 0.0, "fiber_damping", damping, "finite and >= 0")
+    if law.tendon not in TENDONS:
+        raise ModelError(f"{law.law}: tendon must be one of {', '.join(TENDONS)}, not {law.tendon!r}")
+
+
+def _is_elastic(law: DeGrooteFregly2016 | Millard2012) -> bool:
+    return law.tendon == "elastic" and law.tendon_slack_length >= SHORTEST_TENDON * law.optimal_fiber_length
+
+
+def _fiber_row(law: DeGrooteFregly2016 | Millard2012, least: float) -> tuple[float, ...]:
+    """Return the columns of `mjwrap/kernels/fiber.py`; least: shortest fibre of the law's curves [l_o]."""
+    height = law.optimal_fiber_length * math.sin(law.pennation_angle)
+    return (
+        law.max_isometric_force,
+        law.optimal_fiber_length,
+        law.tendon_slack_length,
+        law.pennation_angle,
+        law.max_contraction_velocity,
+        law.damping,
+        float(_is_elastic(law)),
+        height,
+        max(least * law.optimal_fiber_length, height / math.sqrt(1.0 - LEAST_COSINE**2)),
+    )
+
+
 @dataclass(frozen=True)
 class DeGrooteFregly2016:
-    """The muscle of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9) with a rigid tendon and pennation.
+    """The muscle of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9) with pennation, rigid or elastic tendon.
 
     max_isometric_force [N], optimal_fiber_length [m] > 0; tendon_slack_length [m] >= 0; pennation_angle at optimal
     fibre length [rad] in [0, pi/2); max_contraction_velocity [optimal lengths/s]; fiber_damping >= 0 [max isometric
-    forces per max contraction velocity]. `ModelError` otherwise.
+    forces per max contraction velocity], where not given 0 with a rigid tendon and 0.1 with an elastic one, whose fibre
+    then has one velocity at every activation; tendon "rigid" or "elastic", rigid in any case where it is shorter than
+    1e-4 optimal fibre lengths. `ModelError` otherwise.
     """
 
     max_isometric_force: float
@@ -48,34 +97,65 @@ class DeGrooteFregly2016:
     tendon_slack_length: float
     pennation_angle: float = 0.0
     max_contraction_velocity: float = 10.0
-    fiber_damping: float = 0.0
+    fiber_damping: float | None = None
+    tendon: str = "rigid"
     code: ClassVar[int] = muscle.DEGROOTE_FREGLY
     law: ClassVar[str] = "degroote_fregly_2016"
 
     def __post_init__(self) -> None:
-        _positive(
-            self,
-            max_isometric_force=self.max_isometric_force,
-            optimal_fiber_length=self.optimal_fiber_length,
-            max_contraction_velocity=self.max_contraction_velocity,
-        )
-        slack, angle, damping = self.tendon_slack_length, self.pennation_angle, self.fiber_damping
-        _require(
-            self, math.isfinite(slack) and slack >= 0.0, "tendon_slack_length", slack, "finite and >= 0 [m]"
-        )
-        _require(self, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
-        _require(self, math.isfinite(damping) and damping >= 0.0, "fiber_damping", damping, "finite and >= 0")
+        _check_fiber(self)
+
+    @property
+    def damping(self) -> float:
+        """Return the fibre damping in use, given or by default."""
+        if self.fiber_damping is not None:
+            return self.fiber_damping
+        return 0.1 if self.tendon == "elastic" else 0.0
+
+    @property
+    def states(self) -> int:
+        """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
+        return 2 if _is_elastic(self) else 1
 
     def row(self) -> tuple[float, ...]:
-        """Return the parameters in the order of the kernel's section."""
-        return (
-            self.max_isometric_force,
-            self.optimal_fiber_length,
-            self.tendon_slack_length,
-            self.pennation_angle,
-            self.max_contraction_velocity,
-            self.fiber_damping,
-        )
+        """Return the parameters in the order of `mjwrap/kernels/fiber.py`."""
+        return _fiber_row(self, degroote_fregly.LEAST)
+
+
+@dataclass(frozen=True)
+class Millard2012:
+    """The damped muscle of Millard et al. 2013 (doi 10.1115/1.4023390, OpenSim's Millard2012EquilibriumMuscle).
+
+    Sizes, tendon and `ModelError` as for `DeGrooteFregly2016`; fiber_damping is 0.1 with either tendon. Curves have
+    OpenSim's default shapes.
+    """
+
+    max_isometric_force: float
+    optimal_fiber_length: float
+    tendon_slack_length: float
+    pennation_angle: float = 0.0
+    max_contraction_velocity: float = 10.0
+    fiber_damping: float = 0.1
+    tendon: str = "rigid"
+    code: ClassVar[int] = muscle.MILLARD
+    law: ClassVar[str] = "millard_2012"
+
+    def __post_init__(self) -> None:
+        _check_fiber(self)
+
+    @property
+    def damping(self) -> float:
+        """Return the fibre damping in use."""
+        return self.fiber_damping
+
+    @property
+    def states(self) -> int:
+        """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
+        return 2 if _is_elastic(self) else 1
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameters in the order of `mjwrap/kernels/fiber.py`."""
+        return _fiber_row(self, millard.LEAST)
 
 
 _PRM = ("range[0]", "range[1]", "force", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax")
@@ -112,8 +192,13 @@ class MuJoCoMuscle:
         least, most = self.force_range
         _require(self, least <= most, "force range", least, f"at most {most}")
 
+    @property
+    def states(self) -> int:
+        """Return 1: activation."""
+        return 1
+
     def row(self) -> tuple[float, ...]:
-        """Return the parameters in the order of the kernel's section."""
+        """Return the parameters in the order of `mjwrap/kernels/mujoco_muscle.py`."""
         return (*self.prm, *self.length_range, self.acc0, self.gear, *self.force_range)
 
 
@@ -131,6 +216,11 @@ class PathActuator:
     def __post_init__(self) -> None:
         _positive(self, optimal_force=self.optimal_force)
 
+    @property
+    def states(self) -> int:
+        """Return 0: its activation is the excitation."""
+        return 0
+
     def row(self) -> tuple[float, ...]:
-        """Return the parameters in the order of the kernel's section."""
+        """Return the parameter of `path_actuator` in `mjwrap/kernels/muscle.py`."""
         return (self.optimal_force,)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -10,7 +12,8 @@ from mjcf_reading import Vector
 from scipy.integrate import solve_ivp
 
 import mjwrap as mw
-from mjwrap.kernels.activation import advance_activation, zajac_rate
+from mjwrap.kernels import activation
+from mjwrap.kernels.activation import advance_activation, advance_smooth, smooth_rate, zajac_rate
 
 EXACT = 1e-13  # rounding over one exact step; the reference is integrated to 1e-13
 TIMES = (0.01, 0.04)  # [s]
@@ -68,6 +71,62 @@ def test_the_ends_of_the_range(a: float, u: float) -> None:
         )
     assert advance_activation(a, u, *TIMES, 0.0) == pytest.approx(a, abs=1e-15)
     assert advance_activation(a, u, *TIMES, 1e6) == u
+
+
+def slow_smooth_rate(u: float, a: float, times: tuple[float, float], b: float) -> float:
+    """De Groote's equation as printed."""
+    g, z = 0.5 * math.tanh(b * (u - a)), 0.5 + 1.5 * a
+    return ((g + 0.5) / (times[0] * z) + (0.5 - g) * z / times[1]) * (u - a)
+
+
+def test_the_smooth_form_and_its_steps() -> None:
+    """Against the printed equation, integrated; far from the switch at u = a it is Zajac's."""
+    rng = np.random.default_rng(8)
+    for k in range(80):
+        a, u = (
+            (0.0, 1.0)
+            if k % 8 == 0
+            else (1.0, 0.0)
+            if k % 8 == 1
+            else (float(x) for x in rng.uniform(0, 1, 2))
+        )
+        up, down = (float(x) for x in rng.uniform(0.005, 0.1, 2))
+        b, duration = float(rng.choice([1.0, 10.0, 100.0])), 10.0 ** rng.uniform(-4, -0.3)
+        assert smooth_rate(u, a, up, down, b) == pytest.approx(
+            slow_smooth_rate(u, a, (up, down), b), rel=1e-13
+        )
+        assert smooth_rate(u, a, up, down, 1e6) == pytest.approx(zajac_rate(u, a, up, down), rel=1e-12)
+        done = solve_ivp(
+            lambda _, y, u=u, times=(up, down), b=b: [slow_smooth_rate(u, float(y[0]), times, b)],
+            (0.0, duration),
+            [a],
+            method="DOP853",
+            rtol=1e-13,
+            atol=1e-15,
+        )
+        assert advance_smooth(a, u, up, down, b, duration) == pytest.approx(float(done.y[0, -1]), abs=EXACT)
+
+
+def test_the_smooth_form_stays_between_activation_and_excitation() -> None:
+    for a, u in ((0.0, 1.0), (1.0, 0.0), (0.0, 1e-9), (0.4, 0.4), (0.3, 7.0), (0.3, -7.0)):
+        low, high = min(a, max(u, 0.0)), max(a, min(u, 1.0))
+        for duration in (0.0, 1e-9, 2e-3, 0.3, 30.0, 1e6):
+            assert low <= advance_smooth(a, u, *TIMES, 10.0, duration) <= high
+        assert advance_smooth(a, u, *TIMES, 10.0, 0.0) == a
+        assert advance_smooth(a, u, *TIMES, 10.0, 1e6) == pytest.approx(min(max(u, 0.0), 1.0), abs=1e-15)
+
+
+def test_forms_by_their_codes() -> None:
+    for form, rate, step in (
+        (activation.ZAJAC, zajac_rate(0.7, 0.2, *TIMES), advance_activation(0.2, 0.7, *TIMES, 2e-3)),
+        (
+            activation.SMOOTH,
+            smooth_rate(0.7, 0.2, *TIMES, 10.0),
+            advance_smooth(0.2, 0.7, *TIMES, 10.0, 2e-3),
+        ),
+    ):
+        assert activation.rate(form, 0.7, 0.2, *TIMES, 10.0) == rate
+        assert activation.advance(form, 0.2, 0.7, *TIMES, 10.0, 2e-3) == step
 
 
 def test_two_half_steps_make_a_whole_one() -> None:

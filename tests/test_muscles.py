@@ -1,98 +1,34 @@
-"""De Groote-Fregly 2016 with a rigid tendon: curves against OpenSim's tables, forces against an obvious twin."""
+"""De Groote-Fregly 2016 with a rigid tendon: landmarks of the curves, forces against an obvious twin; refusals."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from mjcf_reading import Vector
+from hill_tables import row, values
 
 import mjwrap as mw
+from mjwrap.kernels import degroote_fregly as curves
 from mjwrap.kernels import muscle
 
-HILL = Path(__file__).resolve().parents[2] / "shared" / "reference" / "hill"
-PRINTED = (
-    5e-15  # relative: the tables have 15 significant digits, so half a unit of the last is at worst this
-)
 ROUNDING = 1e-15  # of sums of terms near one, where the result is near zero
-ULP = 2.3e-16  # of arguments near one: how far a printed one may be from the number that OpenSim used
 TWIN = 1e-12  # relative: two ways to write the same formula
-
-
-def table(name: str) -> dict[str, Vector]:
-    """Return the columns of a reference table; skip the test where the reference is not there."""
-    path = HILL / f"{name}.csv"
-    if not path.exists():
-        pytest.skip(
-            f"the reference table {path.name} is not there; it is kept beside the repository, not in it"
-        )
-    head = path.read_text().splitlines()[0].split(",")
-    texts = np.loadtxt(path, delimiter=",", skiprows=1, dtype=str)
-    return {key: texts[:, i] if key == "params" else texts[:, i].astype(float) for i, key in enumerate(head)}
-
-
-def values(curve: object, at: Vector) -> Vector:
-    assert callable(curve)
-    return np.array([curve(float(x)) for x in at])
 
 
 # -------------------------------------------------------------------------------------------- curves
 
-CURVES = {
-    "active": (muscle.dgf_active, "ref_dgf_curves_length", "norm_fiber_length", "fal", "dfal"),
-    "passive": (muscle.dgf_passive, "ref_dgf_curves_length", "norm_fiber_length", "fpe", "dfpe"),
-    "tendon": (muscle.dgf_tendon, "ref_dgf_curves_tendon", "norm_tendon_length", "fse", "dfse"),
-}
-
-
-@pytest.mark.parametrize("name", CURVES)
-def test_curves_are_opensims_to_the_last_printed_digit(name: str) -> None:
-    curve, file, x, y, slope = CURVES[name]
-    known = table(file)
-    error = np.abs(values(curve, known[x]) - known[y])
-    assert (error <= 2 * PRINTED * np.abs(known[y]) + ROUNDING + ULP * np.abs(known[slope])).all()
-
-
-@pytest.mark.parametrize("name", CURVES)
-def test_slopes_of_curves_are_opensims(name: str) -> None:
-    """Central differences of ours meet its printed slopes, with an error that falls at second order."""
-    curve, file, x, _, slope = CURVES[name]
-    known = table(file)
-    at = known[x]
-
-    def error(h: float) -> float:
-        return float(np.abs((values(curve, at + h) - values(curve, at - h)) / (2 * h) - known[slope]).max())
-
-    assert error(1e-3) / error(5e-4) == pytest.approx(4.0, rel=0.02)
-    assert error(1e-5) < 1e-6 * float(np.abs(known[slope]).max())
-
-
-def test_force_velocity_is_opensims_and_so_is_its_inverse() -> None:
-    known = table("ref_dgf_curves_velocity")
-    v, f = known["norm_fiber_velocity"], values(muscle.dgf_velocity, known["norm_fiber_velocity"])
-    assert f == pytest.approx(known["fv"], rel=2 * PRINTED, abs=ROUNDING)
-    d1, d2, d3, d4 = -0.3211346127989808, -8.149, -0.374, 0.8825327733249912
-    assert (np.sinh((f - d4) / d1) - d3) / d2 == pytest.approx(v, abs=1e-14)
-
-    def error(h: float) -> float:
-        slope = d1 * d2 / np.sqrt((d2 * v + d3) ** 2 + 1.0)
-        quotient = (values(muscle.dgf_velocity, v + h) - values(muscle.dgf_velocity, v - h)) / (2 * h)
-        return float(np.abs(quotient - slope).max())
-
-    assert error(1e-3) / error(5e-4) == pytest.approx(4.0, rel=0.02)
-
 
 def test_landmarks_of_the_curves() -> None:
     """What the constants were chosen for."""
-    assert muscle.dgf_passive(0.2) == 0.0
-    assert muscle.dgf_passive(1.6) == pytest.approx(1.0, rel=1e-15)
-    assert muscle.dgf_tendon(1.0) == 0.0
-    assert muscle.dgf_tendon(1.049) == pytest.approx(1.0, rel=1e-13)
-    assert muscle.dgf_velocity(0.0) == pytest.approx(1.0, abs=1e-12)
-    assert muscle.dgf_velocity(-1.0) == pytest.approx(0.0, abs=1e-12)
-    assert muscle.dgf_active(1.0) == pytest.approx(1.0, abs=1e-3)
+    assert curves.passive(0.2)[0] == 0.0
+    assert curves.passive(1.6)[0] == pytest.approx(1.0, rel=1e-15)
+    assert curves.tendon(1.0)[0] == 0.0
+    assert curves.tendon(1.049)[0] == pytest.approx(1.0, rel=1e-13)
+    assert curves.velocity(0.0)[0] == pytest.approx(1.0, abs=1e-12)
+    assert curves.velocity(-1.0)[0] == pytest.approx(0.0, abs=1e-12)
+    assert curves.active(1.0)[0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_the_active_curve_goes_smoothly_through_the_zero_of_a_width() -> None:
@@ -103,7 +39,7 @@ def test_the_active_curve_goes_smoothly_through_the_zero_of_a_width() -> None:
         -0.5 * ((x - 1.055033428970575) / (0.162384573599574 + 0.063303448465465 * x)) ** 2
     )
     third = 0.1 * np.exp(-0.5 * ((x - 1) / 0.353553390593274) ** 2)
-    assert values(muscle.dgf_active, x) == pytest.approx(first + third, rel=1e-14)
+    assert values(curves.active, x)[:, 0] == pytest.approx(first + third, rel=1e-14)
 
 
 # ------------------------------------------------------------------------------- rigid tendon force
@@ -129,13 +65,11 @@ def twin(p: mw.DeGrooteFregly2016, a: float, length: float, speed: float) -> flo
     offset = np.exp(4 * (0.2 - 1) / 0.6)
     passive = (np.exp(4 * (x - 1) / 0.6) - offset) / (np.exp(4) - offset)
     rate = -0.3211346127989808 * np.arcsinh(-8.149 * v - 0.374) + 0.8825327733249912
-    return max(p.max_isometric_force * (a * active * rate + passive + p.fiber_damping * v) * cosine, 0.0)
+    return max(p.max_isometric_force * (a * active * rate + passive + p.damping * v) * cosine, 0.0)
 
 
 def tension(law: mw.DeGrooteFregly2016 | mw.PathActuator, a: float, length: float, speed: float) -> float:
-    params = np.zeros((2, muscle.PARAMS))
-    params[1, : len(law.row())] = law.row()
-    return muscle.tension(law.code, params, 1, a, length, speed)
+    return muscle.tension(law.code, row(mw.PathActuator(1.0), law), 1, a, length, speed)
 
 
 def random_muscle(rng: np.random.Generator) -> mw.DeGrooteFregly2016:
@@ -169,27 +103,6 @@ def test_tension_is_the_twins() -> None:
         )
         pulling += expected > 0
     assert pulling > 1500
-
-
-def test_tension_is_opensims_fibre_force_at_its_equilibria() -> None:
-    """With the tendon as long as OpenSim's stretched one, the fibre is at its length, and pulls as hard."""
-    known = table("ref_dgf_elastic_equilibrium")
-    sizes = {"P1_parallel": (1000, 0.10, 0.20, 0), "P2_pennate_soleuslike": (3549, 0.05, 0.25, 25)}
-    sizes["P3_shorttendon"] = (600, 0.12, 0.03, 8)
-    checked = 0
-    for i, name in enumerate(known["params"]):
-        force, optimal, _, angle = sizes[name]
-        damping = float(known["damping"][i])
-        p = mw.DeGrooteFregly2016(
-            force, optimal, float(known["tendon_length"][i]), math.radians(angle), 10.0, damping
-        )
-        speed = float(known["fiber_velocity"][i] / np.cos(known["pennation"][i]))
-        expected = float(known["fiber_force_along_tendon"][i])
-        found = tension(p, float(known["activation"][i]), float(known["mtu_length"][i]), speed)
-        # lengths printed with 15 digits; their difference, the fibre, is short in some rows
-        assert found == pytest.approx(max(expected, 0.0), rel=1e-11, abs=1e-11 * force)
-        checked += expected > 0.01 * force
-    assert checked > 500
 
 
 def test_a_slack_unit_does_not_pull() -> None:
@@ -262,7 +175,7 @@ def test_a_path_actuator_pulls_by_its_activation_alone() -> None:
         assert [tension(law, a, length, speed) for a in (-1.0, 0.0, 0.5, 1.0, 2.0)] == [0, 0, 125, 250, 500]
 
 
-GOOD = {"max_isometric_force": 500.0, "optimal_fiber_length": 0.1, "tendon_slack_length": 0.2}
+GOOD: dict[str, Any] = {"max_isometric_force": 500.0, "optimal_fiber_length": 0.1, "tendon_slack_length": 0.2}
 NOT_POSITIVE = (0.0, -1.0, math.nan, math.inf)
 REFUSED = [
     *(
@@ -277,19 +190,35 @@ REFUSED = [
 ]
 
 
+@pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])
 @pytest.mark.parametrize(("key", "value", "wanted"), REFUSED)
-def test_sizes_without_sense(key: str, value: float, wanted: str) -> None:
+def test_sizes_without_sense(key: str, value: float, wanted: str, law: type[mw.DeGrooteFregly2016]) -> None:
+    given: dict[str, Any] = {**GOOD, key: value}
     with pytest.raises(mw.ModelError) as caught:
-        mw.DeGrooteFregly2016(**(GOOD | {key: value}))
-    assert str(caught.value).startswith(f"degroote_fregly_2016: {key} must be {wanted}")
+        law(**given)
+    assert str(caught.value).startswith(f"{law.law}: {key} must be {wanted}")
     assert str(caught.value).endswith(f"not {value!r}")
 
 
 def test_sizes_at_the_limits() -> None:
     law = mw.DeGrooteFregly2016(
-        **(GOOD | {"tendon_slack_length": 0.0, "fiber_damping": 0.0, "pennation_angle": 0.0})
+        max_isometric_force=500.0, optimal_fiber_length=0.1, tendon_slack_length=0.0, fiber_damping=0.0
     )
-    assert law.row() == (500.0, 0.1, 0.0, 0.0, 10.0, 0.0)
+    assert law.row() == (500.0, 0.1, 0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.1 * 0.2)
+
+
+@pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])
+def test_tendons(law: type[mw.DeGrooteFregly2016]) -> None:
+    """Elastic where asked, but not where there is next to none; damping where an elastic one needs it."""
+    assert law(**GOOD) == law(**GOOD, tendon="rigid")
+    assert (law(**GOOD).states, law(**GOOD, tendon="elastic").states) == (1, 2)
+    assert law(**GOOD, tendon="elastic").row()[5:7] == (0.1, 1.0)
+    assert law(**GOOD, fiber_damping=0.0, tendon="elastic").row()[5] == 0.0
+    for slack, elastic in ((0.0, False), (0.99e-5, False), (1.01e-5, True)):
+        short = law(**(GOOD | {"tendon_slack_length": slack}), tendon="elastic")
+        assert (short.states, short.row()[6]) == ((2, 1.0) if elastic else (1, 0.0))
+    with pytest.raises(mw.ModelError, match="tendon must be one of rigid, elastic, not 'stiff'"):
+        law(**GOOD, tendon="stiff")
 
 
 @pytest.mark.parametrize("value", NOT_POSITIVE)
