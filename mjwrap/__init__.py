@@ -17,6 +17,7 @@ from mjwrap.errors import (
 
 if TYPE_CHECKING:
     from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
+    from mjwrap.energetics import Energetics, Umberger2010, basal_power
     from mjwrap.fitting import (
         Fit,
         fit_capsule,
@@ -76,6 +77,9 @@ _HOMES = {
     "Millard2012": "muscles",
     "MuJoCoMuscle": "muscles",
     "PathActuator": "muscles",
+    "Energetics": "energetics",
+    "Umberger2010": "energetics",
+    "basal_power": "energetics",
     "MuscleSystem": "system",
     "Recorder": "recording",
 }
@@ -88,6 +92,7 @@ __all__ = [
     "DeGrooteFregly2016",
     "Ellipsoid",
     "EllipticCylinder",
+    "Energetics",
     "Fit",
     "GeometryError",
     "ImplicitSurface",
@@ -109,7 +114,9 @@ __all__ = [
     "Status",
     "SweepSolution",
     "Torus",
+    "Umberger2010",
     "ViaPoint",
+    "basal_power",
     "fit_capsule",
     "fit_cone",
     "fit_cylinder",

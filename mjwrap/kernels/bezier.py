@@ -120,3 +120,37 @@ def inverse(curve, y):
     u = invert(curve[i, YQ], curve[i, YR], (y - curve[i, Y0]) / curve[i, DY], 0.5, ROUNDING)
     x, _ = blend(curve[i, XQ], curve[i, XR], u)
     return curve[i, X0] + curve[i, DX] * x
+
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)  # exact to degree 9: of y dx/du
+
+
+@jit
+def corner_integral(curve, i, u):
+    """Return the integral of y dx over corner i from its start to its parameter u."""
+    total = 0.0
+    for k in range(NODES.shape[0]):
+        s = 0.5 * u * (1.0 + NODES[k])
+        y, _ = blend(curve[i, YQ], curve[i, YR], s)
+        _, across = blend(curve[i, XQ], curve[i, XR], s)
+        total += WEIGHTS[k] * (curve[i, Y0] + curve[i, DY] * y) * across
+    return 0.5 * u * curve[i, DX] * total
+
+
+@jit
+def integral(curve, x):
+    """Return the integral of a curve from the start of its first corner to x: exact but for rounding."""
+    past = x - curve[0, X0]
+    if past <= 0.0:
+        return past * (curve[0, Y0] + 0.5 * curve[0, S0] * past)
+    total = 0.0
+    for i in range(curve.shape[0]):
+        wanted = (x - curve[i, X0]) / curve[i, DX]
+        if wanted < 1.0:
+            return total + corner_integral(
+                curve, i, invert(curve[i, XQ], curve[i, XR], wanted, wanted, CLOSE)
+            )
+        total += corner_integral(curve, i, 1.0)
+    last = curve.shape[0] - 1
+    past = x - curve[last, X0] - curve[last, DX]
+    return total + past * (curve[last, Y0] + curve[last, DY] + 0.5 * curve[last, S1] * past)

@@ -65,3 +65,17 @@ def tendon(x):
     """Tendon force-length curve, one at 4.9 % strain. Negative below the slack length: whoever uses it clamps it."""
     grown = 0.2 * math.exp(TENDON_STIFFNESS * (x - 1.0))
     return grown - 0.2, TENDON_STIFFNESS * grown
+
+
+@jit
+def passive_energy(x):
+    """Integral of the passive curve from 0.2, where it is zero, to x: nowhere negative [F_max l_o]."""
+    past = PASSIVE_STIFFNESS * (x - LEAST)
+    return PASSIVE_OFFSET * (math.expm1(past) - past) / (PASSIVE_STIFFNESS * PASSIVE_SCALE)
+
+
+@jit
+def tendon_energy(x):
+    """Integral of the tendon curve from the slack length to x [F_max l_s]."""
+    past = TENDON_STIFFNESS * (x - 1.0)
+    return 0.2 * (math.expm1(past) - past) / TENDON_STIFFNESS

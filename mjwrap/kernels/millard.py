@@ -97,3 +97,15 @@ def inverse_velocity(force):
 def tendon(x):
     """Tendon force-length curve: zero up to the slack length, one at 4.9 % strain, straight above two thirds."""
     return bezier.evaluate(_TENDON, _TENDON_CUBICS, x)
+
+
+@jit
+def passive_energy(x):
+    """Integral of the passive curve up to x: zero up to optimal fibre length [F_max l_o]."""
+    return bezier.integral(_PASSIVE, x)
+
+
+@jit
+def tendon_energy(x):
+    """Integral of the tendon curve up to x: zero up to the slack length [F_max l_s]."""
+    return bezier.integral(_TENDON, x)
