@@ -1,63 +1,21 @@
-"""Energy of muscles: powers balance, energies are the integrals of forces, metabolism meets OpenSim's probe."""
+"""Energy of muscles: powers balance, and stored energies are the integrals of the forces."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
+from muscle_states import EACH_LAW, SIZES, Vector, evaluate, random_states, rows
+from scipy.integrate import quad, solve_ivp
 
 import mjwrap as mw
 from mjwrap.energetics import Energetics, compute_energetics, metabolic_constants
-from mjwrap.errors import ModelError
+from mjwrap.kernels import energetics as kernel
 from mjwrap.kernels import fiber as fiber_kernel
 from mjwrap.kernels import muscle as muscle_kernel
-
-Vector = NDArray[np.float64]
-TABLE = Path(__file__).parent / "data" / "umberger2010.csv"
-EACH_LAW = pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])
-SIZES = {  # F_max [N], l_o [m], l_s [m], pennation [rad]
-    "parallel": (1000.0, 0.10, 0.20, 0.0),
-    "soleus": (3549.0, 0.05, 0.25, 0.436),
-    "short_tendon": (600.0, 0.12, 0.03, 0.14),
-}
-
-
-def rows(laws: list[Any]) -> tuple[NDArray[np.int64], Vector]:
-    """Laws as the kernels read them: codes (n,) and parameters (n, PARAMS)."""
-    params = np.zeros((len(laws), muscle_kernel.PARAMS))
-    for m, law in enumerate(laws):
-        params[m, : len(law.row())] = law.row()
-    return np.array([law.code for law in laws]), params
-
-
-def evaluate(
-    law: Any, activation: Any, length: Any, velocity: Any, fiber: Any = 0.0, **given: Any
-) -> Energetics:
-    """Energetics of one muscle at many states, each of them given as a number or an array (n,)."""
-    excitation, model = given.get("excitation", activation), given.get("model")
-    states = np.stack(np.broadcast_arrays(*np.atleast_1d(activation, excitation, length, velocity, fiber)))
-    states = states.astype(float)
-    code, params = rows([law])
-    code, params = np.repeat(code, len(states[0])), np.repeat(params, len(states[0]), axis=0)
-    constants = metabolic_constants(model, code, params)
-    return compute_energetics(code, params, states[0], states[1], states[2], states[3], states[4], constants)
-
-
-def random_states(law: Any, count: int, seed: int) -> tuple[Vector, Vector, Vector, Vector]:
-    """Activation, length, speed and fibre length: fibres of 0.3 to 1.7 l_o, tendons from slack to 6 % of strain."""
-    rng = np.random.default_rng(seed)
-    optimal, height = law.optimal_fiber_length, law.optimal_fiber_length * np.sin(law.pennation_angle)
-    fiber = rng.uniform(max(0.3, 1.05 * height / optimal), 1.7, count) * optimal
-    tendon = law.tendon_slack_length * (1.0 + rng.uniform(-0.02, 0.06, count))
-    activation = rng.uniform(0.0, 1.0, count) * (rng.random(count) > 0.1)
-    speed = rng.uniform(-8.0, 8.0, count) * optimal
-    return activation, np.sqrt(fiber**2 - height**2) + tendon, speed, fiber
-
 
 # ------------------------------------------------------------------------------------------------- powers
 
@@ -192,6 +150,36 @@ def test_energies_have_the_forces_as_slopes(law: Any) -> None:
 
 
 @EACH_LAW
+def test_energies_are_the_integrals_of_the_curves(law: Any) -> None:
+    """To rounding, against SciPy's quadrature of the force curves, piece by piece where Millard's are (1e-14 of 1)."""
+    code, strain = law.code, np.linspace(0.0, 0.15, 31)
+    free, breaks = (0.2, []) if law is mw.DeGrooteFregly2016 else (1.0, [1.035, 1.7])
+    for energy, curve, start, ends, corners in (
+        (
+            kernel.passive_energy,
+            lambda x: fiber_kernel.length_curves(code, x)[2],
+            free,
+            free + 8.0 * strain,
+            breaks,
+        ),
+        (
+            kernel.tendon_energy,
+            lambda x: fiber_kernel.tendon_curve(code, x)[0],
+            1.0,
+            1.0 + strain,
+            [1.02, 1.04],
+        ),
+    ):
+        for x in ends:
+            bounds = [start, *(c for c in corners if c < x), x]
+            pieces = [
+                quad(curve, a, b, epsabs=1e-15, epsrel=1e-13, limit=200)[0]
+                for a, b in itertools.pairwise(bounds)
+            ]
+            assert energy(code, x) == pytest.approx(sum(pieces), rel=1e-12, abs=1e-14)
+
+
+@EACH_LAW
 @pytest.mark.parametrize("sizes", SIZES)
 def test_work_over_a_cycle_balances(law: Any, sizes: str) -> None:
     """Integrals of the powers against the energies, within 1e-6 of the work done: a sine of the length, always active.
@@ -242,106 +230,3 @@ def test_work_over_a_cycle_balances(law: Any, sizes: str) -> None:
     assert np.ptp(tendon_energy) > 0.01 * scale * slack / (slack + optimal)  # springs took part
     assert np.ptp(fiber_energy) > 1e-3 * scale
     assert damping[-1] < 0.0
-
-
-# -------------------------------------------------------------------------------------------- metabolism
-
-
-def read_table() -> dict[str, Vector]:
-    """OpenSim's probe over drawn states, see tests/umberger_table.py."""
-    lines = [line for line in TABLE.read_text().splitlines() if not line.startswith("#")]
-    values = np.array([[float(word) for word in line.split(",")] for line in lines[1:]])
-    return dict(zip(lines[0].split(","), values.T, strict=True))
-
-
-def test_metabolic_power_meets_opensim() -> None:
-    """From activation, excitation, length and speed on; 1e-9 of the largest of the parts that cancel in a sum."""
-    table = read_table()
-    count = len(table["total"])
-    cancelling = 0
-    for i in range(count):
-        t = {name: float(column[i]) for name, column in table.items()}
-        unit = mw.DeGrooteFregly2016(
-            t["max_isometric_force"], t["optimal_fiber_length"], t["tendon_slack_length"], t["pennation"],
-            t["max_velocity"], t["damping"],
-        )  # fmt: skip
-        model = mw.Umberger2010(
-            t["slow_twitch_ratio"], aerobic_factor=t["aerobic_factor"], effort=t["effort"],
-            recruitment=bool(t["recruitment"]), negative_work=bool(t["negative_work"]),
-            forbid_negative_power=bool(t["forbid"]), minimum_heat_rate=t["minimum"],
-            mass=None if np.isnan(t["mass"]) else t["mass"],
-        )  # fmt: skip
-        e = evaluate(
-            unit, t["activation"], t["length"], t["velocity"], excitation=t["excitation"], model=model
-        )
-        both = e.activation_heat[0] + e.maintenance_heat[0]
-        rounding = 1e-9 * (both + abs(t["shortening"]) + abs(t["work"]))
-        assert e.fiber_velocity[0] == pytest.approx(t["fiber_velocity"], rel=1e-12)
-        assert both == pytest.approx(t["activation_maintenance"], rel=1e-9)
-        assert e.shortening_heat[0] == pytest.approx(t["shortening"], abs=rounding)
-        assert e.mechanical_work[0] == pytest.approx(t["work"], rel=1e-9, abs=1e-30)
-        assert e.metabolic_power[0] == pytest.approx(t["total"], abs=rounding)
-        cancelling += abs(t["total"]) < 1e-6 * abs(t["work"])
-    assert count == 240
-    assert cancelling > 5
-
-
-@EACH_LAW
-def test_heats_and_work_add_up_and_keep_their_bounds(law: Any) -> None:
-    """The parts are the whole; no muscle wins energy, nor gives less heat than the least rate, 1 W/kg of muscle."""
-    unit, model = law(*SIZES["soleus"], fiber_damping=0.1, tendon="elastic"), mw.Umberger2010()
-    activation, length, speed, fiber = random_states(unit, 300, seed=3)
-    excitation = np.random.default_rng(4).uniform(0.0, 1.0, 300) * (activation > 0.0)
-    e = evaluate(unit, activation, length, speed, fiber, excitation=excitation, model=model)
-    heat = e.activation_heat + e.maintenance_heat + e.shortening_heat + e.resting_heat
-    mass = model.muscle_mass(unit.max_isometric_force, unit.optimal_fiber_length)
-    assert mass == pytest.approx(3549.0 / 0.25e6 * 1059.7 * 0.05, rel=1e-15)
-    rounding = 1e-13 * (np.abs(e.active_power) + heat)
-    assert np.all(np.abs(heat + e.mechanical_work - e.metabolic_power) <= rounding)
-    assert np.all(e.metabolic_power >= -rounding)
-    assert np.all(heat >= mass * (1.0 - 1e-12))
-    idle = (activation == 0.0) & (excitation == 0.0)
-    assert np.any(idle)
-    assert e.metabolic_power[idle] == pytest.approx(mass, rel=1e-12)
-    assert np.any(e.mechanical_work < 0.0)
-    assert np.any(e.resting_heat > 0.0)
-
-
-def test_power_scales_as_its_units_say() -> None:
-    """k times the lengths and the speeds: k times the powers [N m/s], energies [N m], and mass; force alike."""
-    small = mw.Millard2012(*SIZES["soleus"], tendon="elastic")
-    large = replace(
-        small,
-        max_isometric_force=3.0 * small.max_isometric_force,
-        optimal_fiber_length=2.0 * small.optimal_fiber_length,
-        tendon_slack_length=2.0 * small.tendon_slack_length,
-    )
-    activation, length, speed, fiber = random_states(small, 100, seed=5)
-    one = evaluate(small, activation, length, speed, fiber, model=mw.Umberger2010())
-    six = evaluate(large, activation, 2.0 * length, 2.0 * speed, 2.0 * fiber, model=mw.Umberger2010())
-    for field in fields(one):
-        factor = 2.0 if field.name == "fiber_velocity" else 6.0
-        got, wanted = getattr(six, field.name), factor * getattr(one, field.name)
-        assert got == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.max(np.abs(wanted), initial=1.0)), (
-            field.name
-        )
-
-
-def test_one_metabolic_model_for_all_or_one_each() -> None:
-    """Named mistakes: a ratio beyond one, a mass of zero, models that are not as many as muscles."""
-    code, params = rows([mw.DeGrooteFregly2016(*SIZES["parallel"])] * 2)
-    some = metabolic_constants([None, mw.Umberger2010(mass=0.3)], code, params)
-    assert not np.any(some[0])
-    assert some[1, 0] == 0.3
-    with pytest.raises(ModelError, match="1 metabolic models were given for 2 muscles"):
-        metabolic_constants([None], code, params)
-    mistakes: list[dict[str, Any]] = [
-        {"slow_twitch_ratio": 1.1},
-        {"mass": 0.0},
-        {"effort": np.nan},
-        {"density": -1.0},
-    ]
-    for wrong in mistakes:
-        with pytest.raises(ModelError, match=next(iter(wrong))):
-            mw.Umberger2010(**wrong)
-    assert mw.basal_power(75.0) == pytest.approx(90.0)
