@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hill_tables import table
 from muscle_states import EACH_LAW, SIZES, Vector, evaluate, random_states, rows
 from scipy.integrate import quad, solve_ivp
 
@@ -177,6 +178,18 @@ def test_energies_are_the_integrals_of_the_curves(law: Any) -> None:
                 for a, b in itertools.pairwise(bounds)
             ]
             assert energy(code, x) == pytest.approx(sum(pieces), rel=1e-12, abs=1e-14)
+
+
+def test_energies_meet_opensim() -> None:
+    """De Groote-Fregly only, whose integrals OpenSim has in closed form too; they cancel to 1e-15 near their zeros."""
+    passive, tendon = table("ref_dgf_curves_length"), table("ref_dgf_curves_tendon")
+    code = mw.DeGrooteFregly2016.code
+    for x, wanted in zip(passive["norm_fiber_length"], passive["int_fpe"], strict=True):
+        assert kernel.passive_energy(code, x) == pytest.approx(wanted, rel=1e-12, abs=1e-14)
+    for x, wanted in zip(tendon["norm_tendon_length"], tendon["int_fse"], strict=True):
+        assert kernel.tendon_energy(code, x) == pytest.approx(
+            wanted if x > 1.0 else 0.0, rel=1e-11, abs=1e-14
+        )
 
 
 @EACH_LAW
