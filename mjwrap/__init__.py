@@ -16,6 +16,7 @@ from mjwrap.errors import (
 )
 
 if TYPE_CHECKING:
+    from mjwrap.activation import ActivationDynamics
     from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
     from mjwrap.energetics import Energetics, Umberger2010, basal_power
     from mjwrap.fitting import (
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
         fit_torus,
         mesh_points,
     )
+    from mjwrap.mjcf import set_laws
     from mjwrap.muscles import DeGrooteFregly2016, Millard2012, MuJoCoMuscle, PathActuator
     from mjwrap.paths import (
         Contact,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from mjwrap.recording import Recorder
     from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Torus
     from mjwrap.system import MuscleSystem
+    from mjwrap.trials import MuscleTrial, simulate_muscle
 
 __version__ = "0.1.0"
 
@@ -75,6 +78,10 @@ _HOMES = {
     "mesh_points": "fitting",
     "DeGrooteFregly2016": "muscles",
     "Millard2012": "muscles",
+    "set_laws": "mjcf",
+    "ActivationDynamics": "activation",
+    "simulate_muscle": "trials",
+    "MuscleTrial": "trials",
     "MuJoCoMuscle": "muscles",
     "PathActuator": "muscles",
     "Energetics": "energetics",
@@ -85,6 +92,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "ActivationDynamics",
     "Capsule",
     "Cone",
     "Contact",
@@ -101,6 +109,7 @@ __all__ = [
     "ModelError",
     "MuJoCoMuscle",
     "MuscleSystem",
+    "MuscleTrial",
     "Obstacle",
     "ParametricSurface",
     "PathActuator",
@@ -125,6 +134,8 @@ __all__ = [
     "fit_sphere",
     "fit_torus",
     "mesh_points",
+    "set_laws",
+    "simulate_muscle",
     "solve_path",
     "solve_sweep",
 ]

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels import coupling, layout, muscle, readiness
-from mjwrap.mjcf import MuscleDeclaration, Node
+from mjwrap.kernels import coupling, dynamics, layout, muscle
+from mjwrap.mjcf import MuscleDeclaration, Node, keeps_state
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,27 +26,31 @@ class Plan:
     weights: Array  # (C,)
     law: Ints  # (n,)
     params: Array  # (n, PARAMS)
-    source: Ints  # (n,) where the activation comes from
-    source_index: Ints  # (n,) index in act or ctrl
+    source: Ints  # (n,) where the state comes from
+    index: Ints  # (n,) in act
+    control: Ints  # (n,) in ctrl
     ctrl_low: Array  # (n,)
     ctrl_high: Array  # (n,)
-    times: Array  # (n, 2) activation and deactivation time constants [s]
-    has_own: bool  # whether mjwrap integrates an activation itself
+    form: Ints  # (n,) of the activation dynamics
+    times: Array  # (n, 3) activation and deactivation time constants [s], smoothness
+    integrates: bool  # whether mjwrap integrates a state itself
 
 
-def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, float, float]:
-    """Return where a muscle's activation comes from: source, index, lower and upper limit."""
+def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, int, float, float]:
+    """Return where a muscle's state comes from: source, index in act and in ctrl, limits of the control."""
     if declared.actuator < 0:
-        direct = declared.parameters.code == muscle.PATH_ACTUATOR
-        return (readiness.DIRECT if direct else readiness.OWN), 0, -np.inf, np.inf
+        direct = declared.parameters.states == 0
+        return (dynamics.DIRECT if direct else dynamics.OWN), 0, 0, -np.inf, np.inf
     actuator = declared.actuator
-    if int(model.actuator_actnum[actuator]) == 1:
-        return readiness.FROM_ACT, int(model.actuator_actadr[actuator]), -np.inf, np.inf
-    control = int(model.actuator_ctrladr[actuator])
+    states, control = int(model.actuator_actadr[actuator]), int(model.actuator_ctrladr[actuator])
     low, high = -np.inf, np.inf
     if model.actuator_ctrllimited[control]:
         low, high = (float(x) for x in model.actuator_ctrlrange[control])
-    return readiness.FROM_CTRL, control, low, high
+    if keeps_state(model, actuator):
+        return dynamics.KEPT, states, control, low, high
+    if int(model.actuator_actnum[actuator]) == 1:
+        return dynamics.FROM_ACT, states, control, low, high
+    return dynamics.FROM_CTRL, 0, control, low, high
 
 
 def kernel_rows(node: Node) -> list[Array]:
@@ -99,9 +103,11 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
         params=params,
         source=np.array([s[0] for s in sources], dtype=np.int64),
-        source_index=np.array([s[1] for s in sources], dtype=np.int64),
-        ctrl_low=np.array([s[2] for s in sources], dtype=np.float64),
-        ctrl_high=np.array([s[3] for s in sources], dtype=np.float64),
-        has_own=any(s[0] == readiness.OWN for s in sources),
-        times=np.array([declared.activation_times for declared in muscles], dtype=np.float64).reshape(-1, 2),
+        index=np.array([s[1] for s in sources], dtype=np.int64),
+        control=np.array([s[2] for s in sources], dtype=np.int64),
+        ctrl_low=np.array([s[3] for s in sources], dtype=np.float64),
+        ctrl_high=np.array([s[4] for s in sources], dtype=np.float64),
+        form=np.array([declared.activation.form for declared in muscles], dtype=np.int64),
+        times=np.array([declared.activation.row() for declared in muscles], dtype=np.float64).reshape(-1, 3),
+        integrates=any(s[0] in (dynamics.OWN, dynamics.KEPT) for s in sources),
     )

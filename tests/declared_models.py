@@ -48,6 +48,7 @@ PULLEYS = """<spatial name="extensor">
   <pulley divisor="2"/> <site site="via"/> <site site="middle"/> <geom geom="ball" sidesite="ball_side"/>
   <site site="insertion"/>
   <pulley divisor="3"/> <site site="via"/> <site site="insertion"/></spatial>"""
+HOLDER = '<general name="extensor" tendon="extensor" dyntype="user" actdim="2" ctrlrange="0 1" ctrllimited="true"/>'
 MUSCLE = '<muscle name="extensor" tendon="extensor" force="400" lengthrange="0.3 0.6"/>'
 HILL = {"max_isometric_force": 600.0, "optimal_fiber_length": 0.12, "tendon_slack_length": 0.3}
 
@@ -93,12 +94,13 @@ def declared(
     values: dict[str, float | tuple[float, ...]] | dict[str, float] | None = None,
     law: str | None = None,
     muscle: str = "m",
+    texts: dict[str, str] | None = None,
 ) -> str:
     """Return the contents of <custom> for one muscle."""
     made, named = numerics(values or {}, muscle)
-    if law is not None:
-        made += f'<text name="mjwrap_{muscle}_law" data="{law}"/>'
-        named += element("text", f"mjwrap_{muscle}_law")
+    for key, words in {**({} if law is None else {"law": law}), **(texts or {})}.items():
+        made += f'<text name="mjwrap_{muscle}_{key}" data="{words}"/>'
+        named += element("text", f"mjwrap_{muscle}_{key}")
     return f'{made}<tuple name="mjwrap_{muscle}">{"".join(elements)}{named}</tuple>'
 
 

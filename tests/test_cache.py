@@ -37,13 +37,11 @@ print(json.dumps({
                 *path.points(0.01).ravel().tolist()],
     "converged": bool(path.converged), "folder": _jit._CACHE}))
 """
-# A kernel that compiles in a second, and that calls one in another file.
-ADVANCE = """
+# A kernel that compiles in seconds, and that calls one in another file.
+PULL = """
 import json, numpy as np
-from mjwrap.kernels import _jit, readiness
-a = np.array([0.2])
-readiness.advance_own(np.array([readiness.OWN]), np.array([0.9]), np.array([[0.01, 0.04]]), 0.002, a, a)
-print(json.dumps({"numbers": a.tolist(), "folder": _jit._CACHE}))
+from mjwrap.kernels import _jit, fiber
+print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": _jit._CACHE}))
 """
 
 
@@ -133,19 +131,19 @@ def test_uncompiled_kernels_find_the_same(starts: Starts) -> None:
 def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
     package, home = tmp_path / "mjwrap", tmp_path / "cache"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    before = run(ADVANCE, home, package)
+    before = run(PULL, home, package)
     assert before.told[0].startswith(NOTICE)
-    assert run(ADVANCE, home, package).told == []
-    callee = package / "kernels" / "activation.py"
+    assert run(PULL, home, package).told == []
+    callee = package / "kernels" / "degroote_fregly.py"
     text = callee.read_text()
-    assert text.count("z = 0.5 + 1.5 * u") == 1
-    callee.write_text(text.replace("z = 0.5 + 1.5 * u", "z = 0.7 + 1.5 * u"))
-    after = run(ADVANCE, home, package)
+    assert text.count("0.8825327733249912") == 1
+    callee.write_text(text.replace("0.8825327733249912", "0.9825327733249912"))
+    after = run(PULL, home, package)
     assert after.told[0].startswith(NOTICE)
     assert after.folder != before.folder
     assert abs(after.numbers[0] - before.numbers[0]) > 1e-3
     callee.write_text(text)
-    again = run(ADVANCE, home, package)
+    again = run(PULL, home, package)
     assert again.told == []
     assert again.numbers == before.numbers
 
@@ -244,8 +242,8 @@ def test_without_any_lasting_place_each_process_has_its_own(
 def test_kernels_run_from_a_place_passed_over_to(tmp_path: Path) -> None:
     blocked = tmp_path / "blocked"
     blocked.touch()
-    found = run(ADVANCE, blocked)
+    found = run(PULL, blocked)
     assert found.folder.is_relative_to(tmp_path)
     assert not found.folder.is_relative_to(blocked)
     assert len(found.told) == 1
-    assert run(ADVANCE, blocked).told == []
+    assert run(PULL, blocked).told == []

@@ -43,7 +43,7 @@ def described(model: mujoco.MjModel, prefix: str = "", suffix: str = "") -> list
             law, mw.MuJoCoMuscle
         ):  # acc0 is not declared: the compiler computes it from the inertias
             law = replace(law, acc0=0.0)
-        found.append((name, routes, law, muscle.activation_times))
+        found.append((name, routes, law, muscle.activation))
     return found
 
 

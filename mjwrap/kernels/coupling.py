@@ -11,7 +11,6 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.chain import solve_chain
-from mjwrap.kernels.muscle import tension as law_tension
 from mjwrap.kernels.segments import G_A, G_B, G_E, G_FAR, G_NEAR, list_segments
 
 # columns of `links` (N, 4): ids of a node's site, geom, hint site (-1 where none) and body
@@ -120,16 +119,15 @@ def route_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
 
 
 @jit
-def drive_muscles(
-    routes, weights, links, seg, seg_count, info, cvel, subtree_com, body_rootid, law, params, activation,
-    length, velocity, tension, status,
-):  # fmt: skip
-    """Turn solved routes into length, velocity, tension and status of every muscle, (n,) each.
+def measure_muscles(
+    routes, weights, links, seg, seg_count, info, cvel, subtree_com, body_rootid, length, velocity, status
+):
+    """Turn solved routes into length [m], velocity [m/s] and status of every muscle, (n,) each.
 
     A muscle with a route without a path keeps its last values; its status says why.
     """
     c = 0
-    for m in range(law.shape[0]):
+    for m in range(status.shape[0]):
         first = c
         code = lay.CONVERGED
         total, speed = 0.0, 0.0
@@ -137,21 +135,18 @@ def drive_muscles(
             if code == lay.CONVERGED:
                 code = int(info[c, lay.I_STATUS])
             c += 1
+        if code == lay.CONVERGED:
+            for r in range(first, c):
+                total += weights[r] * info[r, lay.I_LENGTH]
+                speed += weights[r] * route_speed(
+                    r, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
+                )
+            if math.isfinite(speed):
+                length[m] = total
+                velocity[m] = speed
+            else:
+                code = lay.NON_FINITE
         status[m] = code
-        if code != lay.CONVERGED:
-            continue
-        for r in range(first, c):
-            total += weights[r] * info[r, lay.I_LENGTH]
-            speed += weights[r] * route_speed(
-                r, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
-            )
-        force = law_tension(law[m], params, m, activation[m], total, speed)
-        if not (math.isfinite(force) and math.isfinite(speed)):
-            status[m] = lay.NON_FINITE
-            continue
-        length[m] = total
-        velocity[m] = speed
-        tension[m] = force
 
 
 @jit

@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.coupling import body_wrenches, drive_muscles, solve_routes
-from mjwrap.kernels.readiness import gather_activation
+from mjwrap.kernels.coupling import body_wrenches, measure_muscles, solve_routes
+from mjwrap.kernels.dynamics import drive_muscles, read_states
 
 
 @jit
 def evaluate(
-    routes, weights, links, law, params, source, source_index, ctrl_low, ctrl_high, off, body_rootid,
-    site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, xipos, act, ctrl, own, excitation, tol,
-    node, seg, seg_count, info, activation, length, velocity, tension, status, wrench,
+    routes, weights, links, law, params, source, index, control, ctrl_low, ctrl_high, form, times, off, body_rootid,
+    site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, xipos, act, ctrl, own, excitation, since, ahead, tol,
+    node, seg, seg_count, info, drive, start_activation, start_fiber, start_length,
+    activation, fiber, length, velocity, tension, next_activation, next_fiber, status, wrench,
 ):  # fmt: skip
     """Find all paths, tensions and body wrenches at the given poses; return whether some muscle has no path.
 
-    Muscles that are `off` (n,) pull with no tension. The other arguments are those of the kernels called here.
+    Muscles that are `off` (n,) pull with no tension and keep their states. The other arguments are those of the
+    kernels called.
     """
     solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg, seg_count, info)
-    gather_activation(source, source_index, ctrl_low, ctrl_high, act, ctrl, own, excitation, activation)
+    read_states(
+        source, index, control, ctrl_low, ctrl_high, act, ctrl, own, excitation, since,
+        start_activation, start_fiber, drive,
+    )  # fmt: skip
+    measure_muscles(
+        routes, weights, links, seg, seg_count, info, cvel, subtree_com, body_rootid, length, velocity, status
+    )
     drive_muscles(
-        routes, weights, links, seg, seg_count, info, cvel, subtree_com, body_rootid, law, params, activation,
-        length, velocity, tension, status,
+        law, params, source, form, times, off, since, ahead, drive, start_activation, start_fiber, start_length,
+        length, velocity, activation, fiber, tension, next_activation, next_fiber, status,
     )  # fmt: skip
     failed = False
     for m in range(status.shape[0]):
         failed = failed or status[m] != 0
-        if off[m]:
-            tension[m] = 0.0
     body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench)
     return failed

@@ -4,18 +4,22 @@ Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendo
 whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing here changes the model.
 """
 
+from mjwrap.mjcf.actuators import keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.files import read_model
 from mjwrap.mjcf.names import name_of, names
 from mjwrap.mjcf.reader import read_declarations
+from mjwrap.mjcf.writing import set_laws
 
 __all__ = [
     "Declarations",
     "MuscleDeclaration",
     "Node",
     "Route",
+    "keeps_state",
     "name_of",
     "names",
     "read_declarations",
     "read_model",
+    "set_laws",
 ]

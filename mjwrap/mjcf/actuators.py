@@ -41,6 +41,12 @@ def is_fixed(model: mujoco.MjModel, tendon: int) -> bool:
     return int(model.wrap_type[model.tendon_adr[tendon]]) == int(mujoco.mjtWrap.mjWRAP_JOINT)
 
 
+def keeps_state(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether an actuator holds activation and fibre length for mjwrap: `dyntype="user" actdim="2"`."""
+    user = int(model.actuator_dyntype[actuator]) == int(mujoco.mjtDyn.mjDYN_USER)
+    return user and int(model.actuator_actnum[actuator]) == 2
+
+
 def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
     """Return why an actuator cannot drive a muscle of mjwrap, or None."""
     kinds = int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
@@ -50,10 +56,13 @@ def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
         return "it belongs to a plugin"
     if model.actuator_actearly[actuator]:
         return "its activation acts early (actearly)"
-    if int(model.actuator_actnum[actuator]) > 1:
-        return "it has more than one activation state"
-    if int(model.actuator_actnum[actuator]) == 0 and float(model.actuator_delay[actuator]) > 0.0:
-        return "its control acts with a delay and it has no activation state"
+    keeps = keeps_state(model, actuator)
+    if int(model.actuator_actnum[actuator]) > 1 and not keeps:
+        return "it has several activation states, but not as dyntype='user' actdim='2' keeps them for mjwrap"
+    if keeps and model.actuator_actlimited[actuator]:
+        return "its actrange would clamp the fibre length among its states; leave actlimited out"
+    if (keeps or int(model.actuator_actnum[actuator]) == 0) and float(model.actuator_delay[actuator]) > 0.0:
+        return "its control acts with a delay and MuJoCo does not integrate its activation"
     return None
 
 
@@ -84,6 +93,7 @@ def native_reason(model: mujoco.MjModel, rest: mujoco.MjData, actuator: int) -> 
     return (
         curves_reason(model, actuator)
         or unfit_reason(model, actuator)
+        or ("its activation states are a user's own" if keeps_state(model, actuator) else None)
         or _inside_reason(model, rest, int(model.actuator_trnid[actuator, 0]))
     )
 

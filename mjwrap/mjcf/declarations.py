@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from mjwrap.activation import ActivationDynamics
 from mjwrap.muscles import Law
 from mjwrap.surfaces import Surface
 
@@ -33,7 +34,7 @@ class MuscleDeclaration:
     """One muscle of a model: ids are MuJoCo's.
 
     name; routes: one, or several joined by pulleys; parameters: the law's dataclass; actuator, tendon: id or -1;
-    activation_times: activation and deactivation time constants [s] where mjwrap integrates the activation itself.
+    activation: the dynamics of the activation, where mjwrap integrates it itself.
     """
 
     name: str
@@ -41,7 +42,7 @@ class MuscleDeclaration:
     parameters: Law
     actuator: int = -1
     tendon: int = -1
-    activation_times: tuple[float, float] = (0.01, 0.04)
+    activation: ActivationDynamics = field(default_factory=ActivationDynamics)
 
     @property
     def law(self) -> str:

@@ -5,25 +5,27 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from mjwrap.activation import FORMS, ActivationDynamics
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.actuators import curves_reason, is_muscle, mujoco_law
+from mjwrap.mjcf.actuators import curves_reason, is_muscle, keeps_state, mujoco_law
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.surfaces import SIZES
-from mjwrap.muscles import DeGrooteFregly2016, Law, PathActuator
+from mjwrap.muscles import TENDONS, DeGrooteFregly2016, Law, Millard2012, PathActuator
 
 OBJ = mujoco.mjtObj
-TIMES = "activation_time_constants"
-DEFAULT_TIMES = (0.01, 0.04)  # [s], as MuJoCo's muscles
-# Per law: the parameters that it needs and those that it can do without.
+TIMES, SMOOTHING = "activation_time_constants", "activation_smoothing"
+LAW, TENDON, DYNAMICS = "law", "tendon_model", "activation_dynamics"  # what the names of texts contain
+HILL_NEEDS = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
+HILL_TAKES = ("pennation_angle", "max_contraction_velocity", "fiber_damping", TIMES, SMOOTHING)
+HILL_LAWS = {"degroote_fregly_2016": DeGrooteFregly2016, "millard_2012": Millard2012}
+# Per law: the numerics that it needs and those that it can do without.
 LAWS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "degroote_fregly_2016": (
-        ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length"),
-        ("pennation_angle", "max_contraction_velocity", "fiber_damping", TIMES),
-    ),
-    "mujoco": ((), ()),
+    **dict.fromkeys(HILL_LAWS, (HILL_NEEDS, HILL_TAKES)),
+    "mujoco": ((), (TIMES, SMOOTHING)),
     "path_actuator": (("optimal_force",), ()),
 }
-NUMERICS = tuple(key for needed, other in LAWS.values() for key in (*needed, *other))
+NUMERICS = tuple(dict.fromkeys(key for needed, other in LAWS.values() for key in (*needed, *other)))
+TEXTS = (LAW, TENDON, DYNAMICS)
 
 Given = dict[str, list[float]]
 
@@ -52,11 +54,20 @@ def read_numerics(model: mujoco.MjModel, ids: list[int]) -> Given:
     return given
 
 
-def read_text(model: mujoco.MjModel, index: int) -> str:
-    """Return the contents of a text."""
-    first = int(model.text_adr[index])
-    raw = bytes(model.text_data[first : first + int(model.text_size[index])])
-    return raw.split(b"\0", 1)[0].decode(errors="replace").strip()
+def read_texts(model: mujoco.MjModel, ids: list[int]) -> dict[str, str]:
+    """Return the contents of texts by what their names contain."""
+    given: dict[str, str] = {}
+    for i in ids:
+        name = name_of(model, OBJ.mjOBJ_TEXT, i)
+        key = max(TEXTS, key=lambda key: name.rfind(key))  # the last: the muscle may be called claw
+        if key not in name:
+            raise ModelError(f"text '{name}' must contain one of these in its name: {listed(TEXTS)}")
+        if key in given:
+            raise ModelError(f"{key} is given twice, the second time by text '{name}'")
+        first = int(model.text_adr[i])
+        raw = bytes(model.text_data[first : first + int(model.text_size[i])])
+        given[key] = raw.split(b"\0", 1)[0].decode(errors="replace").strip()
+    return given
 
 
 def choose_law(given: Given) -> str:
@@ -67,8 +78,11 @@ def choose_law(given: Given) -> str:
     return "mujoco"
 
 
-def build_law(model: mujoco.MjModel, law: str, actuator: int, given: Given) -> Law:
-    """Return a law's dataclass from the numerics of a tuple, or from its muscle actuator for MuJoCo's own."""
+def build_law(model: mujoco.MjModel, law: str, actuator: int, given: Given, tendon: str | None) -> Law:
+    """Return a law's dataclass from the numerics of a tuple, or from its muscle actuator for MuJoCo's own.
+
+    tendon: "rigid" or "elastic", or None where the tuple does not say; only laws with a tendon know it.
+    """
     if law not in LAWS:
         raise ModelError(f"law '{law}' does not exist; laws: {listed(LAWS)}")
     needed, other = LAWS[law]
@@ -80,10 +94,21 @@ def build_law(model: mujoco.MjModel, law: str, actuator: int, given: Given) -> L
         raise ModelError(
             f"law '{law}' has no parameter {listed(unused)}; it has: {listed((*needed, *other))}"
         )
+    if law in HILL_LAWS:
+        values = {key: value[0] for key, value in given.items() if key not in (TIMES, SMOOTHING)}
+        found = HILL_LAWS[law](**values) if tendon is None else HILL_LAWS[law](**values, tendon=tendon)
+        if found.states == 2 and actuator >= 0 and not keeps_state(model, actuator):
+            raise ModelError(
+                "an elastic tendon needs a fibre length as state, for which its actuator has no place: write it as "
+                "<general dyntype='user' actdim='2' .../>, or let mjwrap.set_laws(spec, ...) do that"
+            )
+        return found
+    if tendon is not None:
+        raise ModelError(
+            f"law '{law}' has no tendon; {TENDON} ({listed(TENDONS)}) is for {listed(HILL_LAWS)}"
+        )
     if law == "path_actuator":
         return PathActuator(given["optimal_force"][0])
-    if law == "degroote_fregly_2016":
-        return DeGrooteFregly2016(**{key: value[0] for key, value in given.items() if key != TIMES})
     if actuator < 0 or not is_muscle(model, actuator):
         raise ModelError(
             f"law 'mujoco' needs a muscle actuator in the tuple; laws that do not: {_without('mujoco')}"
@@ -98,15 +123,25 @@ def _without(law: str) -> str:
     return listed(f"{other} (needs {listed(needed)})" for other, (needed, _) in LAWS.items() if other != law)
 
 
-def activation_times(given: Given, actuator: int) -> tuple[float, float]:
-    """Return activation and deactivation time constants [s]; only a muscle without actuator can be given its own."""
-    if TIMES not in given:
-        return DEFAULT_TIMES
-    if actuator >= 0:
+def activation_dynamics(
+    model: mujoco.MjModel, actuator: int, given: Given, dynamics: str | None
+) -> ActivationDynamics:
+    """Return how the activation follows the excitation, where mjwrap integrates it; elsewhere nothing may be given."""
+    own = actuator < 0 or keeps_state(model, actuator)
+    said = [key for key in (TIMES, SMOOTHING) if key in given] + [DYNAMICS] * (dynamics is not None)
+    if said and not own:
         raise ModelError(
-            f"{TIMES} are for muscles without an actuator; this one has its actuator's own dynamics"
+            f"{listed(said)} is for muscles whose activation mjwrap integrates, those without an actuator "
+            f"or with one of dyntype='user' actdim='2'; this one has its actuator's own dynamics"
         )
-    up, down = given[TIMES]
-    if not (np.isfinite([up, down]).all() and up > 0.0 and down > 0.0):
+    if dynamics is not None and dynamics not in FORMS:
+        raise ModelError(f"{DYNAMICS} '{dynamics}' do not exist; there are: {listed(FORMS)}")
+    up, down = given.get(TIMES, (None, None))
+    if (
+        up is not None
+        and down is not None
+        and not (np.isfinite([up, down]).all() and up > 0.0 and down > 0.0)
+    ):
         raise ModelError(f"{TIMES} must be finite and positive [s], not {up} and {down}")
-    return up, down
+    smoothing = given[SMOOTHING][0] if SMOOTHING in given else 10.0
+    return ActivationDynamics(dynamics or "zajac", up, down, smoothing)

@@ -11,12 +11,16 @@ from mjwrap.mjcf.actuators import is_fixed, pulled_tendon, unfit_reason
 from mjwrap.mjcf.declarations import MuscleDeclaration
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.parameters import (
+    DYNAMICS,
+    LAW,
     NUMERICS,
-    activation_times,
+    TENDON,
+    TEXTS,
+    activation_dynamics,
     build_law,
     choose_law,
     read_numerics,
-    read_text,
+    read_texts,
 )
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
 from mjwrap.mjcf.surfaces import size_keys
@@ -36,7 +40,7 @@ class _Elements:
     tendons: list[int] = field(default_factory=list)
     stops: list[Stop] = field(default_factory=list)
     numerics: list[int] = field(default_factory=list)
-    laws: list[str] = field(default_factory=list)
+    texts: list[int] = field(default_factory=list)
 
 
 def read_tuple(model: mujoco.MjModel, index: int) -> MuscleDeclaration:
@@ -69,12 +73,13 @@ def read_tuple(model: mujoco.MjModel, index: int) -> MuscleDeclaration:
         if unfit is not None:
             raise ModelError(f"its actuator cannot be taken over: {unfit}")
         given = read_numerics(model, found.numerics)
-        law = found.laws[0] if found.laws else choose_law(given)
-        parameters = build_law(model, law, actuator, given)
-        times = activation_times(given, actuator)
+        texts = read_texts(model, found.texts)
+        law = texts.get(LAW) or choose_law(given)
+        parameters = build_law(model, law, actuator, given, texts.get(TENDON))
+        dynamics = activation_dynamics(model, actuator, given, texts.get(DYNAMICS))
     except ModelError as error:
         raise ModelError(f"muscle '{name}' (tuple '{tuple_name}'): {error}") from None
-    return MuscleDeclaration(name, routes, parameters, actuator, tendon, times)
+    return MuscleDeclaration(name, routes, parameters, actuator, tendon, dynamics)
 
 
 def _collect(model: mujoco.MjModel, index: int) -> _Elements:
@@ -99,18 +104,16 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
             found.stops.append(Stop("sizes", item))
         elif kind == OBJ.mjOBJ_NUMERIC:
             found.numerics.append(item)
-        elif kind == OBJ.mjOBJ_TEXT and "law" in name_of(model, kind, item):
-            found.laws.append(read_text(model, item))
+        elif kind == OBJ.mjOBJ_TEXT:
+            found.texts.append(item)
         else:
             what = kind.name.removeprefix("mjOBJ_").lower()
             raise ModelError(
                 f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, or "
-                f"a text whose name contains 'law'"
+                f"a text whose name contains one of: {listed(TEXTS)}"
             )
     _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
     _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)
-    if len(found.laws) > 1:
-        raise ModelError(f"at most one law makes a muscle, not {len(found.laws)}: {listed(found.laws)}")
     if found.tendons and is_fixed(model, found.tendons[0]):
         name = name_of(model, OBJ.mjOBJ_TENDON, found.tendons[0])
         raise ModelError(f"tendon '{name}' is fixed: it has joints, not a path")

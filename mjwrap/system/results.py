@@ -59,6 +59,11 @@ class Results:
         return self._last.activation.copy()
 
     @property
+    def fiber_length(self) -> Array:
+        """Fibre lengths (n,) [m], 0 for a law without fibres; along the fibre, so longer than its reach if pennate."""
+        return self._last.fiber.copy()
+
+    @property
     def status(self) -> NDArray[np.int64]:
         """Codes of `mjwrap.Status` (n,)."""
         return self._last.status.copy()

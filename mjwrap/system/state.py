@@ -18,12 +18,18 @@ class State:
         self.segments = np.zeros((len(plan.node) + routes, segments.SEGMENT))
         self.count = np.zeros(routes, dtype=np.int64)
         self.info = np.zeros((routes, layout.INFO))
-        self.length, self.velocity, self.tension, self.activation = (np.zeros(n) for _ in range(4))
+        self.length, self.velocity, self.tension, self.activation, self.fiber = (
+            np.zeros(n) for _ in range(5)
+        )
         self.status = np.zeros(n, dtype=np.int64)
         self.failures = np.zeros(n, dtype=np.int64)
         self.last_failure = np.zeros(n, dtype=np.int64)
         self.details = [""] * n  # which elements are to blame for the last failure
-        self.own, self.own_now = np.zeros(n), np.zeros(n)
+        self.drive, self.start_activation, self.start_fiber, self.start_length = (
+            np.zeros(n) for _ in range(4)
+        )
+        self.next_activation, self.next_fiber = np.zeros(n), np.zeros(n)
+        self.own = np.zeros((n, 2))  # activations and fibre lengths of muscles without an actuator
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)
         self.scratch = mujoco.MjData(model)
@@ -34,7 +40,7 @@ class State:
         """Start cold: no branch, no last force, no failures."""
         self.node[:, layout.S_MODE] = layout.COLD
         self.count[:] = 0
-        for array in (self.length, self.velocity, self.tension, self.activation, self.own, self.own_now):
+        for array in (self.length, self.velocity, self.tension, self.activation, self.fiber, self.own):
             array[:] = 0.0
         self.status[:] = 0
         self.failures[:] = 0

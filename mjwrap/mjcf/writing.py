@@ -1,0 +1,133 @@
+"""Muscle laws written into an MjSpec, as the tuples, numerics and texts that `tuples.py` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+
+from mjwrap.activation import ActivationDynamics
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.names import listed
+from mjwrap.mjcf.parameters import (
+    DYNAMICS,
+    HILL_NEEDS,
+    HILL_TAKES,
+    LAW,
+    NUMERICS,
+    SMOOTHING,
+    TENDON,
+    TEXTS,
+    TIMES,
+)
+from mjwrap.muscles import DeGrooteFregly2016, Millard2012
+
+OBJ = mujoco.mjtObj
+HillLaw = DeGrooteFregly2016 | Millard2012
+
+
+def set_laws(
+    spec: mujoco.MjSpec, laws: Mapping[str, HillLaw], dynamics: ActivationDynamics | None = None
+) -> None:
+    """Give muscles of an MjSpec a Hill-type law each, by the name of their actuator, or of their tuple without one.
+
+    The spec is changed in place and compiles in MuJoCo without mjwrap. A muscle that a tuple declares keeps its route
+    and gets the new law; a native one gets a tuple. Where the law has an elastic tendon, or `dynamics` are given,
+    mjwrap integrates the states: the actuator becomes `dyntype="user" actdim="2"`, keeps control and control range and
+    pulls nothing without mjwrap; the time constants of a native muscle go with it unless `dynamics` replace them.
+    `ModelError` for a name that no muscle has, before anything is changed.
+    """
+    actuators = {actuator.name: actuator for actuator in spec.actuators}
+    tuples = {entry.name: entry for entry in spec.tuples if "mjwrap" in entry.name}
+    by_actuator = {_actuator_of(entry): entry for entry in tuples.values()}
+    free = {name.replace("mjwrap_", ""): e for name, e in tuples.items() if not _actuator_of(e)}
+    unknown = [name for name in laws if name not in actuators and name not in free]
+    if unknown:
+        raise ModelError(
+            f"no muscle {listed(unknown)}; actuators: {listed(actuators)}; tuples: {listed(free)}"
+        )
+    for name, law in laws.items():
+        chosen = dynamics
+        actuator = actuators.get(name)
+        if actuator is not None and (law.states == 2 or dynamics is not None):
+            chosen = dynamics or _native_dynamics(actuator)
+            _hold_states(actuator)
+        entry = by_actuator.get(name) if actuator is not None else free[name]
+        if entry is None:
+            entry = spec.add_tuple(name=_fresh(f"mjwrap_{name}", tuples))
+            _set_elements(entry, [(OBJ.mjOBJ_ACTUATOR, name, 0.0)])
+        _write(spec, entry, name, law, chosen)
+
+
+def _elements(entry: Any) -> list[tuple[mujoco.mjtObj, str, float]]:
+    kinds, names, marks = list(entry.objtype), list(entry.objname), list(entry.objprm)
+    return [(OBJ(int(k)), str(n), float(p)) for k, n, p in zip(kinds, names, marks, strict=True)]
+
+
+def _set_elements(entry: Any, elements: list[tuple[mujoco.mjtObj, str, float]]) -> None:
+    entry.objtype = [int(kind) for kind, _, _ in elements]
+    entry.objname = [name for _, name, _ in elements]
+    entry.objprm = [prm for _, _, prm in elements]
+
+
+def _actuator_of(entry: Any) -> str:
+    return next((name for kind, name, _ in _elements(entry) if kind == OBJ.mjOBJ_ACTUATOR), "")
+
+
+def _fresh(name: str, taken: Mapping[str, Any]) -> str:
+    """Return the name, with a number where there is one of that name already."""
+    found, k = name, 2
+    while found in taken:
+        found, k = f"{name}_{k}", k + 1
+    return found
+
+
+def _native_dynamics(actuator: Any) -> ActivationDynamics | None:
+    """Return the time constants of MuJoCo's muscle dynamics; None where the actuator has others."""
+    if actuator.dyntype != mujoco.mjtDyn.mjDYN_MUSCLE:
+        return None
+    return ActivationDynamics("zajac", float(actuator.dynprm[0]), float(actuator.dynprm[1]))
+
+
+def _hold_states(actuator: Any) -> None:
+    actuator.dyntype, actuator.actdim = mujoco.mjtDyn.mjDYN_USER, 2
+    actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
+    actuator.actlimited = mujoco.mjtLimited.mjLIMITED_FALSE
+    for prm in (actuator.dynprm, actuator.gainprm, actuator.biasprm):
+        prm[:] = 0.0
+
+
+def _is_parameter(kind: mujoco.mjtObj, name: str) -> bool:
+    """Return whether an element says which law a muscle has, rather than where it runs."""
+    if kind == OBJ.mjOBJ_NUMERIC:
+        return any(key in name for key in NUMERICS)
+    return kind == OBJ.mjOBJ_TEXT and any(key in name for key in TEXTS)
+
+
+def _write(
+    spec: mujoco.MjSpec, entry: Any, muscle: str, law: HillLaw, dynamics: ActivationDynamics | None
+) -> None:
+    """Replace a tuple's parameters by those of a law."""
+    given = {key: getattr(law, key, None) for key in (*HILL_NEEDS, *HILL_TAKES)}
+    numerics = {key: [float(value)] for key, value in given.items() if value is not None}
+    texts = {LAW: law.law, TENDON: law.tendon}
+    if dynamics is not None:
+        up, down, smoothing = dynamics.row()
+        numerics |= {TIMES: [up, down], SMOOTHING: [smoothing]}
+        texts[DYNAMICS] = dynamics.dynamics
+    elements = [e for e in _elements(entry) if not _is_parameter(e[0], e[1])]
+    known = {n.name: n for n in spec.numerics} | {t.name: t for t in spec.texts}
+    for key, values in numerics.items():
+        name = f"mjwrap_{muscle}_{key}"
+        if name in known:
+            spec.delete(known[name])
+        spec.add_numeric(name=name, data=values, size=len(values))
+        elements.append((OBJ.mjOBJ_NUMERIC, name, 0.0))
+    for key, words in texts.items():
+        name = f"mjwrap_{muscle}_{key}"
+        if name in known:
+            spec.delete(known[name])
+        spec.add_text(name=name, data=words)
+        elements.append((OBJ.mjOBJ_TEXT, name, 0.0))
+    _set_elements(entry, elements)

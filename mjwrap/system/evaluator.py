@@ -1,0 +1,138 @@
+"""What a MuscleSystem is made of, and how one evaluation goes; `muscle_system.py` says when."""
+
+from __future__ import annotations
+
+import weakref
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import ModelError, PathError, StateError
+from mjwrap.kernels import evaluation, readiness
+from mjwrap.mjcf import read_declarations
+from mjwrap.paths import Status
+from mjwrap.plan import build_plan
+from mjwrap.system.checks import check_state, ends_inside
+from mjwrap.system.results import Array, Results
+from mjwrap.system.state import State
+from mjwrap.takeover import Takeover
+
+TOLERANCE = 1e-10  # largest tangency error of a path
+
+
+class Evaluator(Results):
+    """The muscles of a model, what is known of each mjData, and one evaluation of all paths, states and tensions."""
+
+    def __init__(self, model: mujoco.MjModel, *, strict: bool = False) -> None:
+        if not isinstance(model, mujoco.MjModel):
+            raise ModelError(
+                f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
+            )
+        self.model = model
+        self.strict = strict
+        self._takeover = Takeover(model)
+        with self._takeover.suspended():
+            found = read_declarations(model)
+        super().__init__(found, build_plan(model, found.muscles), model)
+        self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
+        self._states: dict[int, State] = {}
+        self._groups_off = 0
+        self._off = np.zeros(self._plan.n, dtype=np.bool_)
+        self.excitation: Array = np.zeros(self._plan.n)
+        self._root = np.asarray(model.body_rootid, dtype=np.int64)
+        self._parent = np.asarray(model.body_parentid, dtype=np.int64)
+        self._dofs = tuple(
+            np.asarray(a, dtype=np.int64) for a in (model.body_dofadr, model.body_dofnum, model.dof_parentid)
+        )
+
+    def _state(self, data: mujoco.MjData) -> State:
+        if self._takeover.lost():
+            raise ModelError(
+                "the actuators of this model pull by themselves again (release); build a new MuscleSystem to go on"
+            )
+        if not isinstance(data, mujoco.MjData):
+            raise StateError(f"expected an MjData, not {type(data).__name__}")
+        if data.model._address != self.model._address:
+            raise StateError("this MjData belongs to another model than this MuscleSystem")
+        key = id(data)
+        if key not in self._states:
+            self._states[key] = State(self.model, self._plan)
+            weakref.finalize(data, self._states.pop, key, None)
+        return self._states[key]
+
+    def _check(self, data: mujoco.MjData) -> None:
+        """Raise `StateError` naming what is not finite."""
+        if readiness.all_finite(
+            data.qpos, data.qvel, data.act, data.ctrl, data.mocap_pos, data.mocap_quat, self.excitation
+        ):
+            return
+        check_state(self.model, data)
+        bad = readiness.first_bad(self.excitation)
+        raise StateError(f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s")
+
+    def _evaluate(
+        self, state: State, poses: mujoco.MjData, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0
+    ) -> None:
+        """Paths, activations and tensions from the poses and velocities of `poses`; wrenches into state.wrench.
+
+        since [s]: how old the states in `data` are; ahead [s]: how long the tensions are to act.
+        """
+        plan = self._plan
+        failed = evaluation.evaluate(
+            plan.routes, plan.weights, plan.links, plan.law, plan.params,
+            plan.source, plan.index, plan.control, plan.ctrl_low, plan.ctrl_high, plan.form, plan.times,
+            self._disabled(), self._root,
+            poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos,
+            data.act, data.ctrl, state.own, self.excitation, since, ahead, TOLERANCE,
+            state.node, state.segments, state.count, state.info,
+            state.drive, state.start_activation, state.start_fiber, state.start_length,
+            state.activation, state.fiber,
+            state.length, state.velocity, state.tension, state.next_activation, state.next_fiber,
+            state.status, state.wrench,
+        )  # fmt: skip
+        self._last = state
+        state.time = data.time
+        state.in_scratch = poses is state.scratch
+        if failed:
+            self._failed(state, poses, data)
+
+    def _disabled(self) -> NDArray[np.bool_]:
+        """Return which muscles (n,) belong to an actuator group that the model's options switch off."""
+        off = int(self.model.opt.disableactuator)
+        if off != self._groups_off:
+            actuators = [muscle.actuator for muscle in self.declarations]
+            groups = [int(self.model.actuator_group[a]) if a >= 0 else -1 for a in actuators]
+            self._off = np.array([group >= 0 and bool(off >> group & 1) for group in groups], dtype=np.bool_)
+            self._groups_off = off
+        return self._off
+
+    def _failed(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
+        """Note which muscles have no path; raise where the user asked for that."""
+        bad = np.flatnonzero(state.status)
+        for i in bad:
+            if state.last_failure[i] != state.status[i]:
+                inside = state.status[i] == Status.ENDPOINT_INSIDE
+                state.details[i] = ends_inside(self.model, poses, self.declarations[i]) if inside else ""
+            state.last_failure[i] = state.status[i]
+        first = int(bad[0])
+        if (state.status == Status.NON_FINITE).any():
+            first = int(np.flatnonzero(state.status == Status.NON_FINITE)[0])
+            raise StateError(
+                f"muscle '{self.names[first]}': a pose or force is not finite at time {data.time:g} s"
+            )
+        if self.strict:
+            raise PathError(f"muscle '{self.names[first]}' at time {data.time:g} s: {self.reason(first)}")
+
+    def _refresh(self, state: State, data: mujoco.MjData) -> mujoco.MjData:
+        """Return scratch data with the kinematics of the present qpos and qvel; `data` may lag by a step."""
+        self._check(data)
+        model, scratch = self.model, state.scratch
+        scratch.qpos[:] = data.qpos
+        scratch.qvel[:] = data.qvel
+        scratch.mocap_pos[:] = data.mocap_pos
+        scratch.mocap_quat[:] = data.mocap_quat
+        mujoco.mj_kinematics(model, scratch)
+        mujoco.mj_comPos(model, scratch)
+        mujoco.mj_comVel(model, scratch)
+        return scratch
