@@ -1,5 +1,6 @@
 """Comparing with MuJoCo's tendons: equal where both are right, and planted faults found and put to the right side."""
 
+import re
 from collections.abc import Callable
 
 import mujoco
@@ -17,9 +18,9 @@ from mjwrap.comparison import (
     with_native_laws,
 )
 from mjwrap.comparison.jumps import _refine
-from mjwrap.comparison.poses import PoseMaker
 from mjwrap.comparison.tendons import WrapRecord, tendon_spans
 from mjwrap.comparison.twins import Comparer
+from mjwrap.poses import PoseMaker
 
 BALL = """
 <mujoco>
@@ -235,6 +236,12 @@ def test_coupled_joints_follow_and_tangents_are_derivatives() -> None:
     assert poses.middle()[0] == 0.0
     (summary,) = compare_poses(model, samples=11).muscles.values()
     assert summary.counts == {"AGREE": summary.poses}
+
+
+def test_a_joint_that_an_equality_holds_is_drawn_there() -> None:
+    held = '<joint joint1="follower" polycoef=".1 0 0 0 0"/>'
+    model = load(re.sub(r'<joint joint1="follower".*/>', held, COUPLED))
+    assert (PoseMaker(model, model.qpos0).random(20).qpos[:, 1] == 0.1).all()
 
 
 def jump_at(place: float, length: float, slope: float) -> Callable[[float], tuple[float, float]]:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.comparison.geometry import Fault
-from mjwrap.comparison.poses import Motion, PoseMaker
 from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
 from mjwrap.comparison.verdict import slope
+from mjwrap.poses import Motion, PoseMaker
 
 Array = NDArray[np.float64]
 Probe = Callable[[float], tuple[float, float]]  # place in the sweep -> length, slope

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from mjwrap.comparison.jumps import Jump, find_jumps
 from mjwrap.comparison.motion import pristine
-from mjwrap.comparison.poses import PoseMaker
 from mjwrap.comparison.twins import Batch, Comparer
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.errors import ModelError
+from mjwrap.poses import PoseMaker
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.comparison.geometry import Fault, judge
-from mjwrap.comparison.poses import Motion
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
+from mjwrap.poses import Motion
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]

@@ -1,9 +1,10 @@
-"""Poses to compare at: sweeps of every joint over its range, and random ones; joints that are coupled follow."""
+"""Poses of a model: sweeps of every joint over its range, and random ones; joints that are coupled follow."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -34,6 +35,23 @@ class Motion:
     base: int = 0
 
 
+class Coupling(NamedTuple):
+    """An active joint equality: q = qpos0 + Σ cᵢ xⁱ, x the leader's q − qpos0; leader -1: x = 0."""
+
+    joint: int
+    leader: int
+    coefficients: Array  # (5,)
+
+
+def read_couplings(model: mujoco.MjModel) -> list[Coupling]:
+    """Return the active joint equalities of a model, in its order."""
+    return [
+        Coupling(int(model.eq_obj1id[i]), int(model.eq_obj2id[i]), model.eq_data[i, :5].copy())
+        for i in range(model.neq)
+        if int(model.eq_type[i]) == int(mujoco.mjtEq.mjEQ_JOINT) and model.eq_active0[i]
+    ]
+
+
 class PoseMaker:
     """Makes poses of a model around a base pose qpos (nq,)."""
 
@@ -42,18 +60,7 @@ class PoseMaker:
         self.base = np.array(base, dtype=np.float64)
         self.number = number
         self.rng = np.random.default_rng(seed)
-        self._couplings = self._read_couplings()
-
-    def _read_couplings(self) -> list[tuple[int, int, Array]]:
-        """Return (joint, the joint that it follows, coefficients) of the active joint equalities."""
-        model = self.model
-        return [
-            (int(model.eq_obj1id[i]), int(model.eq_obj2id[i]), model.eq_data[i, :5].copy())
-            for i in range(model.neq)
-            if int(model.eq_type[i]) == int(mujoco.mjtEq.mjEQ_JOINT)
-            and model.eq_active0[i]
-            and int(model.eq_obj2id[i]) >= 0
-        ]
+        self._couplings = read_couplings(model)
 
     def joints(self) -> list[int]:
         """Return the joints that can be swept: all but free ones."""
@@ -109,7 +116,11 @@ class PoseMaker:
             for joint, leader, c in self._couplings:
                 if joint == swept:
                     continue
-                adr, leader_adr = int(model.jnt_qposadr[joint]), int(model.jnt_qposadr[leader])
+                adr = int(model.jnt_qposadr[joint])
+                if leader < 0:
+                    qpos[adr] = model.qpos0[adr] + c[0]
+                    continue
+                leader_adr = int(model.jnt_qposadr[leader])
                 x = qpos[leader_adr] - model.qpos0[leader_adr]
                 qpos[adr] = model.qpos0[adr] + float(np.polynomial.polynomial.polyval(x, c))
                 slope = float(np.polynomial.polynomial.polyval(x, c[1:] * np.arange(1, 5)))
