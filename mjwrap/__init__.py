@@ -17,6 +17,19 @@ from mjwrap.errors import (
 
 if TYPE_CHECKING:
     from mjwrap.activation import ActivationDynamics
+    from mjwrap.calibration import (
+        FiberFit,
+        Finding,
+        HillFit,
+        Implausible,
+        LengthRange,
+        ParameterLimits,
+        ParameterReport,
+        fit_fiber_and_slack,
+        hill_from_mujoco,
+        implausible,
+        length_ranges,
+    )
     from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
     from mjwrap.energetics import Energetics, Umberger2010, basal_power
     from mjwrap.fitting import (
@@ -50,6 +63,17 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "FiberFit": "calibration",
+    "Finding": "calibration",
+    "HillFit": "calibration",
+    "Implausible": "calibration",
+    "LengthRange": "calibration",
+    "ParameterLimits": "calibration",
+    "ParameterReport": "calibration",
+    "fit_fiber_and_slack": "calibration",
+    "hill_from_mujoco": "calibration",
+    "implausible": "calibration",
+    "length_ranges": "calibration",
     "ImplicitSurface": "custom_surfaces",
     "ParametricSurface": "custom_surfaces",
     "Capsule": "surfaces",
@@ -101,9 +125,14 @@ __all__ = [
     "Ellipsoid",
     "EllipticCylinder",
     "Energetics",
+    "FiberFit",
+    "Finding",
     "Fit",
     "GeometryError",
+    "HillFit",
+    "Implausible",
     "ImplicitSurface",
+    "LengthRange",
     "Millard2012",
     "MjwrapError",
     "ModelError",
@@ -111,6 +140,8 @@ __all__ = [
     "MuscleSystem",
     "MuscleTrial",
     "Obstacle",
+    "ParameterLimits",
+    "ParameterReport",
     "ParametricSurface",
     "PathActuator",
     "PathError",
@@ -131,8 +162,12 @@ __all__ = [
     "fit_cylinder",
     "fit_ellipsoid",
     "fit_elliptic_cylinder",
+    "fit_fiber_and_slack",
     "fit_sphere",
     "fit_torus",
+    "hill_from_mujoco",
+    "implausible",
+    "length_ranges",
     "mesh_points",
     "set_laws",
     "simulate_muscle",

@@ -77,6 +77,8 @@ def surfaces() -> None:
         axis.set(
             title=name, xlabel="fibre length [l_o]", ylabel="fibre velocity [v_max]", zlabel="tension [F_max]"
         )
+        axis.set_xticks((0.5, 1.0, 1.5))
+        axis.set_yticks((-1.0, 0.0, 1.0))
         axis.view_init(25, -60)
         axis.set_box_aspect(None, zoom=0.9)
     figure.savefig(IMAGES / "muscle_surface.png", dpi=110)

@@ -1,0 +1,29 @@
+"""Muscle parameters from data: how long muscles get, fibres and tendons that fit, and what is implausible."""
+
+from mjwrap.calibration.fibers import (
+    MUJOCO_RANGE,
+    WIDE_RANGE,
+    FiberFit,
+    HillFit,
+    fit_fiber_and_slack,
+    hill_from_mujoco,
+)
+from mjwrap.calibration.judge import implausible
+from mjwrap.calibration.ranges import LengthRange, length_ranges
+from mjwrap.calibration.report import Finding, Implausible, ParameterLimits, ParameterReport
+
+__all__ = [
+    "MUJOCO_RANGE",
+    "WIDE_RANGE",
+    "FiberFit",
+    "Finding",
+    "HillFit",
+    "Implausible",
+    "LengthRange",
+    "ParameterLimits",
+    "ParameterReport",
+    "fit_fiber_and_slack",
+    "hill_from_mujoco",
+    "implausible",
+    "length_ranges",
+]

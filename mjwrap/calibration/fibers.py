@@ -1,0 +1,166 @@
+"""Optimal fibre length and tendon slack length from the lengths that a muscle takes.
+
+With a rigid tendon and constant fibre height, musculotendon length l and normalised fibre length x are related by
+l = l_s + l_o √(x² − sin²α₀). Two lengths at two wanted x give l_o and l_s.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mjwrap.errors import ModelError
+from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle
+
+MUJOCO_RANGE = (0.75, 1.05)  # of normalised fibre lengths: MuJoCo's default
+WIDE_RANGE = (0.5, 1.5)  # where the active force-length curve is well above zero
+LEAST_SLACK = 0.05  # share of the shortest length that a tendon is given at least
+
+
+@dataclass(frozen=True)
+class FiberFit:
+    """Fibre and tendon that take a muscle from its shortest to its longest length.
+
+    optimal_fiber_length, tendon_slack_length [m], pennation_angle at optimal fibre length [rad]; fiber_range:
+    normalised fibre lengths at the shortest and longest musculotendon length, tendon rigid; wanted: those asked for;
+    implied_slack_length [m]: the slack length that the wanted range asks for, negative where there is none.
+    """
+
+    optimal_fiber_length: float
+    tendon_slack_length: float
+    pennation_angle: float
+    fiber_range: tuple[float, float]
+    wanted: tuple[float, float]
+    implied_slack_length: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether the fibre has the wanted range; otherwise the tendon would be too short or negative for it."""
+        return self.tendon_slack_length == self.implied_slack_length
+
+    @property
+    def sentence(self) -> str:
+        """What was done, in words."""
+        low, high = self.wanted
+        if self.exact:
+            return f"fibre from {low:.4g} to {high:.4g} optimal lengths, as wanted"
+        return (
+            f"fibre from {low:.4g} to {high:.4g} optimal lengths would need a tendon slack length of "
+            f"{1e3 * self.implied_slack_length:.4g} mm; with {1e3 * self.tendon_slack_length:.4g} mm it goes from "
+            f"{self.fiber_range[0]:.4g} to {self.fiber_range[1]:.4g}"
+        )
+
+
+def fit_fiber_and_slack(
+    shortest: float,
+    longest: float,
+    *,
+    fiber_range: tuple[float, float] = MUJOCO_RANGE,
+    pennation_angle: float = 0.0,
+    least_slack: float = LEAST_SLACK,
+) -> FiberFit:
+    """Return the fibre and tendon whose fibre spans `fiber_range` between two musculotendon lengths [m].
+
+    fiber_range: normalised fibre lengths, tendon rigid; pennation_angle at optimal fibre length [rad]. Where the
+    tendon would be shorter than `least_slack` times the shortest length, or negative, it gets that length, and the
+    fibre range is widened by as much below as above (`FiberFit.exact` is false). `ModelError` for lengths or a range
+    that do not increase, and for a fibre that is shorter than its height l_o sin α₀.
+    """
+    if not (math.isfinite(longest) and 0.0 < shortest < longest):
+        raise ModelError(
+            f"lengths must be finite, positive and increasing [m], not {shortest:g} and {longest:g}: does the muscle "
+            "have a path, and a joint that moves it has a range?"
+        )
+    if not 0.0 <= pennation_angle < 0.5 * math.pi:
+        raise ModelError(f"pennation_angle must be in [0, pi/2) [rad], not {pennation_angle!r}")
+    if not 0.0 <= least_slack < 1.0:
+        raise ModelError(f"least_slack must be a share of the shortest length in [0, 1), not {least_slack!r}")
+    low, high = (float(x) for x in fiber_range)
+    height = math.sin(pennation_angle)
+    if not (math.isfinite(high) and height < low < high):
+        raise ModelError(
+            f"fiber_range must increase from above the fibre's height, {height:.4g} optimal lengths, not {low:g} to "
+            f"{high:g}"
+        )
+    along = math.sqrt(low * low - height * height), math.sqrt(high * high - height * height)
+    optimal = (longest - shortest) / (along[1] - along[0])
+    implied = shortest - optimal * along[0]
+    slack, reached = implied, (low, high)
+    if implied < least_slack * shortest:
+        slack = least_slack * shortest
+        optimal = _widened(shortest - slack, longest - slack, low + high, height)
+        reached = (
+            math.hypot((shortest - slack) / optimal, height),
+            math.hypot((longest - slack) / optimal, height),
+        )
+    return FiberFit(optimal, slack, float(pennation_angle), reached, (low, high), implied)
+
+
+def _widened(short: float, long: float, total: float, height: float) -> float:
+    """Return the optimal length at which the fibre's two normalised lengths have the sum `total`.
+
+    short, long [m]: along the tendon. u = 1/l_o² solves √(short² u + height²) + √(long² u + height²) = total.
+    """
+    difference = (long * long - short * short) / total
+    mean = 0.5 * (short * short + long * long)
+    constant = 0.25 * total * total - height * height
+    u = 2.0 * constant / (mean + math.sqrt(mean * mean - difference * difference * constant))
+    return 1.0 / math.sqrt(u)
+
+
+@dataclass(frozen=True)
+class HillFit:
+    """A Hill-type muscle in place of MuJoCo's: its parameters, its fibre, and what could not be kept."""
+
+    muscle: DeGrooteFregly2016
+    fiber: FiberFit
+    notes: tuple[str, ...] = ()
+
+
+def hill_from_mujoco(
+    law: MuJoCoMuscle,
+    *,
+    pennation_angle: float = 0.0,
+    fiber_damping: float | None = None,
+    tendon: str = "rigid",
+    least_slack: float = LEAST_SLACK,
+) -> HillFit:
+    """Return MuJoCo's muscle as a Hill-type one, whose lengths are those of the tendon, without gear.
+
+    F_max: `force`, or scale/acc0 where that is negative, times gear; fibre: over the actuator's length range from
+    range[0] to range[1]; vmax in the same metres per second. A negative implied tendon length is mended as
+    `fit_fiber_and_slack` does. The curves themselves differ. fiber_damping, tendon: those of `DeGrooteFregly2016`.
+    `ModelError` where a parameter is not possible.
+    """
+    short, long = law.length_range
+    optimal = (long - short) / (law.prm[1] - law.prm[0]) / law.gear
+    fiber = fit_fiber_and_slack(
+        short / law.gear,
+        long / law.gear,
+        fiber_range=(law.prm[0], law.prm[1]),
+        pennation_angle=pennation_angle,
+        least_slack=least_slack,
+    )
+    peak = mujoco_peak_force(law)
+    notes = () if fiber.exact else (fiber.sentence,)
+    least = -law.force_range[0] * law.gear
+    if least < peak:
+        notes += (
+            f"the actuator's force range limits its tension to {least:.4g} N; the Hill-type muscle's is not",
+        )
+    muscle = DeGrooteFregly2016(
+        max_isometric_force=peak,
+        optimal_fiber_length=fiber.optimal_fiber_length,
+        tendon_slack_length=fiber.tendon_slack_length,
+        pennation_angle=fiber.pennation_angle,
+        max_contraction_velocity=law.prm[6] * optimal / fiber.optimal_fiber_length,
+        fiber_damping=fiber_damping,
+        tendon=tendon,
+    )
+    return HillFit(muscle, fiber, notes)
+
+
+def mujoco_peak_force(law: MuJoCoMuscle) -> float:
+    """Return the peak tension [N] of MuJoCo's muscle at optimal length: gear × force, or gear × scale/acc0."""
+    force, scale = law.prm[2], law.prm[3]
+    return law.gear * (force if force >= 0.0 else scale / max(law.acc0, 1e-15))

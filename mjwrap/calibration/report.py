@@ -1,0 +1,99 @@
+"""What a report of implausible parameters says: one finding per muscle and kind, and what could not be judged."""
+
+from __future__ import annotations
+
+import enum
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from mjwrap.calibration.ranges import LengthRange
+
+
+class Implausible(enum.StrEnum):
+    """What is wrong with a parameter; in brackets what `Finding.value` and `limit` are."""
+
+    NEGATIVE_TENDON = "negative tendon"  # slack length [m], 0
+    SHORT_TENDON = "short tendon"  # slack length in optimal fibre lengths
+    LONG_TENDON = "long tendon"  # the same
+    SHORT_FIBER = "short fibre"  # least normalised fibre length over the joints' ranges, tendon rigid
+    LONG_FIBER = "long fibre"  # largest one
+    SLACK = "slack throughout"  # longest musculotendon length [m], slack length [m]
+    PASSIVE_AT_REST = "passive at rest"  # tension without activation, in maximum isometric forces
+    LENGTH_RANGE = "length range"  # how far the path leaves the actuator's length range, as a share of it
+    NO_FORCE = "no force"  # maximum isometric force [N]
+    HUGE_FORCE = "huge force"  # the same
+
+
+@dataclass(frozen=True)
+class ParameterLimits:
+    """What counts as plausible.
+
+    fiber: normalised fibre lengths; tendon: slack length in optimal fibre lengths, about 0.1 to 12 in people; passive:
+    tension without activation at rest, in maximum isometric forces; excess: of the path over the declared length
+    range, as a share of it; force: maximum isometric force [N].
+    """
+
+    fiber: tuple[float, float] = (0.4, 1.6)
+    tendon: tuple[float, float] = (0.05, 15.0)
+    passive: float = 0.1
+    excess: float = 0.02
+    force: tuple[float, float] = (1.0, 2e4)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One implausible parameter: `value` lies beyond `limit`; both have the unit that `Implausible` gives the kind."""
+
+    muscle: str
+    kind: Implausible
+    value: float
+    limit: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class ParameterReport:
+    """All findings, in the order of the muscles; remarks: by muscle, what could not be judged and why.
+
+    ranges: the length ranges that the fibres were judged over.
+    """
+
+    findings: tuple[Finding, ...]
+    remarks: Mapping[str, tuple[str, ...]]
+    ranges: Mapping[str, LengthRange]
+
+    def of(self, kind: Implausible) -> list[Finding]:
+        """Return the findings of one kind."""
+        return [finding for finding in self.findings if finding.kind == kind]
+
+    def table(self) -> str:
+        """Return a line per finding, then how many there are of each kind, then the remarks."""
+        width = max((len(finding.muscle) for finding in self.findings), default=0)
+        lines = [f"{f.muscle:{width}s}  {f.kind:16s}  {f.sentence}" for f in self.findings]
+        counts = Counter(finding.kind for finding in self.findings)
+        muscles = len({finding.muscle for finding in self.findings})
+        kinds = ", ".join(f"{kind} {counts[kind]}" for kind in Implausible if counts[kind])
+        lines.append(
+            f"findings: {len(self.findings)}, muscles with any: {muscles}" + (f" ({kinds})" if kinds else "")
+        )
+        lines += [f"{name}: {remark}" for name, remarks in self.remarks.items() for remark in remarks]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return findings, remarks and length ranges as plain values, for JSON; a length that is NaN becomes None."""
+        return {
+            "findings": [asdict(finding) for finding in self.findings],
+            "remarks": {name: list(remarks) for name, remarks in self.remarks.items()},
+            "length_ranges": {
+                name: {
+                    "shortest": found.shortest if found.shortest == found.shortest else None,
+                    "longest": found.longest if found.longest == found.longest else None,
+                    "poses": found.poses,
+                    "without_path": dict(found.without_path),
+                    "held": list(found.held),
+                }
+                for name, found in self.ranges.items()
+            },
+        }
