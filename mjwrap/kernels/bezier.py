@@ -1,30 +1,41 @@
-"""Curves of quintic Bézier corners (Millard et al. 2013, doi 10.1115/1.4023390): y(x) and its slope.
+"""Curves of quintic Bézier corners (Millard et al. 2013, doi 10.1115/1.4023390): y(x), its slope and its integral.
 
 A corner joins (x0, y0, slope) to (x1, y1, slope); its end tangents meet at C, and with c = 0.1 + 0.8 curviness the
 control points are P0, P0 + c (C − P0) twice, P1 + c (C − P1) twice, P1. Counted from P0 in units of P1 − P0, a
 coordinate is then 5 u (1 − u)³ (1 + u) q + 5 u³ (1 − u)(2 − u) r + u⁵ with q, r those of the inner points: two numbers
 a coordinate.
 Outside its corners a curve goes on along its end tangents.
+
+y(x) has no closed form, and inverting x(u) at every evaluation is slow. `tabulate` therefore inverts it once, to
+rounding, and fits a polynomial to the slope on each of some hundred pieces, halved until it is 1e-11 off, or 5e-15 of
+the corner's steepest slope; `evaluate` reads value and slope from its integral.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mjwrap.kernels._jit import jit
 
-BINS = 32  # of each corner, for the start of the inversion: a cubic each, at most 1e-5 off
 CLOSE = 1e-9  # last Newton step where the slope is far from zero
 ROUNDING = 1e-16
 MOST = 80  # Newton steps and bisections in an inversion; two steps are normal
+DEGREE = 9  # of a piece's value; its slope's is one less
+NARROWEST = 2.0**-10  # piece, in widths of its corner
+CELLS = 2048  # equal parts of a curve
+# Error of a piece's slope, relative to itself and to the steepest of its corner.
+SAME, STEEPEST = 1e-11, 5e-15
 
 Corner = tuple[float, float, float, float, float, float]  # x0, y0, slope at 0, x1, y1, slope at 1
+Array = NDArray[np.float64]
 X0, DX, XQ, XR, Y0, DY, YQ, YR, S0, S1 = range(10)  # columns of a corner
+MIDDLE, SCALE, FIRST = range(3)  # columns of a piece: middle, 1 / half width, then DEGREE + 1 coefficients
 
 
-def corners(ends: list[Corner], curviness: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the constants (n, 10) of a curve's corners, from left to right, and the cubics (n, BINS, 4) of u(x)."""
+def corners(ends: list[Corner], curviness: list[float]) -> Array:
+    """Return the constants (n, 10) of a curve's corners, from left to right."""
     rows = []
     for (x0, y0, s0, x1, y1, s1), bent in zip(ends, curviness, strict=True):
         c = 0.1 + 0.8 * bent
@@ -33,30 +44,91 @@ def corners(ends: list[Corner], curviness: list[float]) -> tuple[NDArray[np.floa
         x_part, y_part = (x_c - x0) / (x1 - x0), (y_c - y0) / (y1 - y0)
         inner = (c * x_part, 1.0 - c * (1.0 - x_part)), (c * y_part, 1.0 - c * (1.0 - y_part))
         rows.append((x0, x1 - x0, *inner[0], y0, y1 - y0, *inner[1], s0, s1))
-    cubics = np.array([_cubics(row[XQ], row[XR]) for row in rows])
-    return np.array(rows), cubics
+    return np.array(rows)
 
 
-def _cubics(q: float, r: float) -> NDArray[np.float64]:
-    """Return the Hermite cubics of u over equal bins of the corner's x, in the bin's own variable 0..1."""
-    u = np.zeros(BINS + 1)
-    slope = np.zeros(BINS + 1)
-    for i in range(BINS + 1):
-        u[i] = invert(q, r, i / BINS, i / BINS, ROUNDING)
-        slope[i] = 1.0 / blend(q, r, u[i])[1] / BINS
-    rise = u[1:] - u[:-1]
-    second = 3.0 * rise - 2.0 * slope[:-1] - slope[1:]
-    return np.stack([u[:-1], slope[:-1], second, slope[:-1] + slope[1:] - 2.0 * rise], axis=1)
-
-
-@jit
-def blend(q, r, u):
+def _blend(q, r, u):
     """Return a coordinate of a corner at u in [0, 1], counted from one end in units of both ends, and its slope."""
     v = 1.0 - u
     uu, vv = u * u, v * v
     b, d = 5.0 * u * vv * v * (1.0 + u), 5.0 * vv * (1.0 - 2.0 * u - 5.0 * uu)
     e, f = 5.0 * uu * u * v * (2.0 - u), 5.0 * uu * (6.0 - 12.0 * u + 5.0 * uu)
     return q * b + r * e + uu * uu * u, q * d + r * f + 5.0 * uu * uu
+
+
+blend = jit(_blend)
+
+
+def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
+    """Return a curve's pieces (n, 2 + DEGREE + 1), and the number of the first in each of CELLS equal parts.
+
+    The first and last pieces are the straight ones outside the corners; the first one's scale is the number of cells in
+    a unit of x. No cell has more than two pieces.
+    """
+    start, end = _straight(curve[0], 0.0), _straight(curve[-1], 1.0)
+    width = end[MIDDLE] - start[MIDDLE]
+    start[SCALE] = CELLS / width
+    inner = np.vstack([_pieces(corner) for corner in curve])
+    ends = np.concatenate([inner[1:, MIDDLE] - 1.0 / inner[1:, SCALE], end[None, MIDDLE]])
+    edges = start[MIDDLE] + width / CELLS * np.arange(CELLS)
+    if np.diff(ends).min() * start[SCALE] < 1.0:
+        raise ValueError("a piece is narrower than a cell")
+    cells = 1 + np.searchsorted(ends[:-1], edges, side="right")
+    return np.vstack([start, inner, end]), cells.astype(np.int16)
+
+
+def _straight(corner: Array, u: float) -> Array:
+    """Return the piece that goes on from an end of a corner along its tangent."""
+    piece = np.zeros(FIRST + DEGREE + 1)
+    piece[MIDDLE], piece[SCALE] = corner[X0] + u * corner[DX], 1.0
+    piece[FIRST] = corner[Y0] + u * corner[DY]
+    piece[FIRST + 1] = corner[S1] if u else corner[S0]
+    return piece
+
+
+def _pieces(corner: Array) -> Array:
+    """Return the pieces of a corner, from left to right, halved until each is close enough."""
+    nodes = np.cos(np.arange(DEGREE) * np.pi / (DEGREE - 1))  # with the ends, so that pieces meet there
+    tests = np.linspace(-1.0, 1.0, 11)
+    fit = np.linalg.inv(chebyshev.chebvander(nodes, DEGREE - 1))
+    power = np.array([np.pad(chebyshev.cheb2poly(row), (0, DEGREE))[:DEGREE] for row in np.eye(DEGREE)])
+    middle, half = np.array([0.5]), 0.5  # of the corner's width
+    done: list[Array] = []
+    steepest = np.abs(_curve(corner, np.linspace(0.0, 1.0, 65))[1]).max()
+    while middle.size:
+        value = _curve(corner, middle)[0]
+        _, slope = _curve(corner, (middle[:, None] + half * nodes).ravel())
+        coefficients = slope.reshape(-1, DEGREE) @ fit.T @ power  # (n, DEGREE) of the slope
+        _, there = _curve(corner, (middle[:, None] + half * tests).ravel())
+        there = there.reshape(-1, tests.size)
+        off = np.abs(coefficients @ np.vander(tests, DEGREE, increasing=True).T - there)
+        good = (off <= SAME * np.abs(there) + STEEPEST * steepest).all(axis=1) | (half <= NARROWEST)
+        width = half * corner[DX]
+        for k in np.flatnonzero(good):
+            x = corner[X0] + middle[k] * corner[DX]
+            rising = coefficients[k] * width / np.arange(1, DEGREE + 1)
+            done.append(np.concatenate([[x, 1.0 / width, value[k]], rising]))
+        half *= 0.5
+        middle = np.concatenate([middle[~good] - half, middle[~good] + half])
+    done.sort(key=lambda piece: float(piece[MIDDLE]))
+    return np.array(done)
+
+
+def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
+    """Return y and dy/dx at parts (n,) of a corner's width: x(u) inverted by Newton's steps, kept in a bracket."""
+    part = np.clip(part, 0.0, 1.0)
+    low, high, u = np.zeros_like(part), np.ones_like(part), part
+    for _ in range(MOST):
+        value, slope = _blend(corner[XQ], corner[XR], u)
+        low, high = np.where(value < part, u, low), np.where(value < part, high, u)
+        new = u + (part - value) / slope
+        new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        last = np.abs(new - u).max() <= CLOSE
+        u = new
+        if last:
+            break
+    y, up = _blend(corner[YQ], corner[YR], u)
+    return corner[Y0] + corner[DY] * y, corner[DY] * up / (corner[DX] * _blend(corner[XQ], corner[XR], u)[1])
 
 
 @jit
@@ -84,26 +156,33 @@ def invert(q, r, wanted, start, enough):
 
 
 @jit
-def evaluate(curve, cubics, x):
-    """Return y and dy/dx of a curve at x."""
-    last = curve.shape[0] - 1
-    if x <= curve[0, X0]:
-        return curve[0, Y0] + curve[0, S0] * (x - curve[0, X0]), curve[0, S0]
-    i = 0
-    while i <= last and x >= curve[i, X0] + curve[i, DX]:
-        i += 1
-    if i > last:
-        slope = curve[last, S1]
-        return curve[last, Y0] + curve[last, DY] + slope * (x - curve[last, X0] - curve[last, DX]), slope
-    wanted = (x - curve[i, X0]) / curve[i, DX]
-    place = min(max(wanted, 0.0), 1.0) * BINS
-    k = min(int(place), BINS - 1)
-    t = place - k
-    start = cubics[i, k, 0] + t * (cubics[i, k, 1] + t * (cubics[i, k, 2] + t * cubics[i, k, 3]))
-    u = invert(curve[i, XQ], curve[i, XR], wanted, min(max(start, 0.0), 1.0), CLOSE)
-    _, across = blend(curve[i, XQ], curve[i, XR], u)
-    y, up = blend(curve[i, YQ], curve[i, YR], u)
-    return curve[i, Y0] + curve[i, DY] * y, curve[i, DY] * up / (curve[i, DX] * across)
+def evaluate(pieces, cells, x):
+    """Return y and dy/dx at x of a curve that `tabulate` has cut into pieces."""
+    last = pieces.shape[0] - 1
+    past = x - pieces[0, MIDDLE]
+    cell = past * pieces[0, SCALE]
+    if cell < 0.0:
+        return pieces[0, FIRST] + pieces[0, FIRST + 1] * past, pieces[0, FIRST + 1]
+    if cell >= CELLS:
+        return pieces[last, FIRST] + pieces[last, FIRST + 1] * (x - pieces[last, MIDDLE]), pieces[
+            last, FIRST + 1
+        ]
+    k = cells[int(cell)]
+    t = (x - pieces[k, MIDDLE]) * pieces[k, SCALE]
+    if t > 1.0:
+        k += 1
+        t = (x - pieces[k, MIDDLE]) * pieces[k, SCALE]
+    # even and odd powers side by side: y = even + t odd in the square of t
+    square = t * t
+    even, odd = pieces[k, FIRST + DEGREE - 1], pieces[k, FIRST + DEGREE]
+    d_even = d_odd = 0.0
+    for i in range(FIRST + DEGREE - 3, FIRST - 1, -2):
+        d_even = d_even * square + even
+        even = even * square + pieces[k, i]
+        d_odd = d_odd * square + odd
+        odd = odd * square + pieces[k, i + 1]
+    slope = odd + 2.0 * t * (d_even + t * d_odd)
+    return even + t * odd, slope * pieces[k, SCALE]
 
 
 @jit

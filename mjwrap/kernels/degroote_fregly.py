@@ -18,6 +18,10 @@ PASSIVE_OFFSET = math.exp(PASSIVE_STIFFNESS * (LEAST - 1.0))
 PASSIVE_SCALE = math.exp(4.0) - PASSIVE_OFFSET
 D1, D2, D3, D4 = -0.3211346127989808, -8.149, -0.374, 0.8825327733249912
 TENDON_STIFFNESS = math.log(6.0) / 0.049
+WIDEST = (
+    8.0  # |asinh| of the force-velocity curve's argument beyond which no velocity is looked for: 180 v_max
+)
+MOST = 60  # Newton steps; three or four are normal
 
 
 @jit
@@ -51,13 +55,46 @@ def passive(x):
 def velocity(v):
     """Force-velocity curve, about zero at -1 and one at 0; unbounded, and negative below -1."""
     s = D2 * v + D3
-    return D1 * math.asinh(s) + D4, D1 * D2 / math.sqrt(s * s + 1.0)
+    root = math.sqrt(s * s + 1.0)
+    return D1 * math.copysign(math.log(abs(s) + root), s) + D4, D1 * D2 / root  # a logarithm: asinh
 
 
 @jit
 def inverse_velocity(force):
     """Velocity at which `velocity` has the given value."""
     return (math.sinh((force - D4) / D1) - D3) / D2
+
+
+@jit
+def balancing_velocity(strength, damping, wanted, close):
+    """Return v with strength f_v(v) + damping v = wanted, and f_v and its slope there; one of the factors is above 0.
+
+    With s = D2 v + D3 = sinh y this is a y + b sinh y = c, convex on the root's side of zero: Newton's steps from
+    beyond the root fall to it. The last step is at most `close`; the error left is its square.
+    """
+    a, b = -D1 * strength, -damping / D2
+    c = strength * D4 + b * D3 - wanted
+    size = abs(c)
+    y = min(size / (a + b), WIDEST)
+    if y > 1.0 and b > 0.0:
+        y = min(y, math.log(size / b + math.sqrt(size / b * (size / b) + 1.0)))
+    sinh = cosh = step = 0.0
+    for _ in range(MOST):
+        grown = math.exp(y)
+        shrunk = 1.0 / grown
+        sinh, cosh = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
+        step = (size - a * y - b * sinh) / (a + b * cosh)
+        if abs(step) <= close or y + step >= WIDEST:
+            break
+        y += step
+    y = min(y + step, WIDEST)
+    if abs(step) > 1e-5:
+        grown = math.exp(y)
+        sinh, cosh = 0.5 * (grown - 1.0 / grown), 0.5 * (grown + 1.0 / grown)
+    else:
+        sinh, cosh = sinh + step * (cosh + 0.5 * step * sinh), cosh + step * (sinh + 0.5 * step * cosh)
+    sign = math.copysign(1.0, c)
+    return (sign * sinh - D3) / D2, D1 * sign * y + D4, D1 * D2 / cosh
 
 
 @jit

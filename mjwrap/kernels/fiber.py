@@ -11,71 +11,34 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels import degroote_fregly, millard
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.balance import (
+    AT_MINIMUM,
+    CLOSE,
+    MOST,
+    NORMAL,
+    NOT_CONVERGED,
+    SLACK_TENDON,
+    balance,
+    balanced_forces,
+    balancing_velocity,
+    forces,
+    length_curves,
+    rest_imbalance,
+    tendon_curve,
+    velocity_curve,
+)
 
 # Columns of params: F_max [N], l_o [m], l_s [m], pennation at l_o [rad], v_max [l_o/s], fibre damping [F_max per v_max
 # l_o], 1 where the tendon is elastic, fibre height [m], shortest fibre length [m].
 F_MAX, OPTIMAL, SLACK, PENNATION, V_MAX, DAMPING, ELASTIC, HEIGHT, LEAST = range(9)
-MILLARD = millard.CODE
 
-NORMAL = 0
-AT_MINIMUM = 1  # the fibre is at its minimum length, and does not balance the tendon
-SLACK_TENDON = 2  # no tension; the fibre's own force is zero too
-NOT_CONVERGED = 3
-
-MOST = 60  # evaluations in one solution; a step of a simulation takes two to six
-CLOSE = 1e-6  # [F_max] imbalance from which one more Newton step ends far below 1e-8
-LOOSE = 1e-2  # [F_max] the same for a first estimate
-STRAINED = 1.08  # [l_s] tendon length from which at most the iteration starts
-STEEP, OFFSET = (
-    0.2,
-    0.2,
-)  # [F_max] imbalance above which an exponential tendon is taken by its logarithm; its offset
-FASTEST = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
+SURE = 3e-2  # [F_max] imbalance of a prediction up to which it is trusted
+WILD = 1.0  # [v_max l_o] change of velocity within a step beyond which the step is backward Euler's
+GUESS = 1e-4  # last Newton step for the velocity at the beginning of a step
+EXACT = 1e-8  # the same for `fiber_rate`
 SPACING = 0.02  # [l_o] between looks for the first equilibrium
 FAR = 2.0  # [l_o] beyond which passive force alone grows: there is one equilibrium at most
-
-
-# ------------------------------------------------------------------------------- a law's curves, by code
-
-
-@jit
-def length_curves(law, x):
-    """Return the active force-length curve, its slope, the passive one and its slope at fibre length x [l_o]."""
-    if law == MILLARD:
-        active, d_active = millard.active(x)
-        passive, d_passive = millard.passive(x)
-    else:
-        active, d_active = degroote_fregly.active(x)
-        passive, d_passive = degroote_fregly.passive(x)
-    return active, d_active, passive, d_passive
-
-
-@jit
-def velocity_curve(law, v):
-    """Return the force-velocity curve and its slope at fibre velocity v [v_max l_o]."""
-    if law == MILLARD:
-        return millard.velocity(v)
-    return degroote_fregly.velocity(v)
-
-
-@jit
-def inverse_velocity(law, force):
-    """Return the fibre velocity [v_max l_o] at which the force-velocity curve has a value."""
-    if law == MILLARD:
-        return millard.inverse_velocity(force)
-    return degroote_fregly.inverse_velocity(force)
-
-
-@jit
-def tendon_curve(law, x):
-    """Return the tendon's force [F_max] and its slope at tendon length x [l_s]: both zero where it is slack."""
-    if x <= 1.0:
-        return 0.0, 0.0
-    if law == MILLARD:
-        return millard.tendon(x)
-    return degroote_fregly.tendon(x)
 
 
 # ------------------------------------------------------------------------------------- forces, SI units
@@ -131,87 +94,6 @@ def rigid_tension(law, params, m, activation, length, speed):
     return max(cosine * _along_fiber(law, params, m, activation, fiber, speed * cosine), 0.0)
 
 
-# --------------------------------------------------------------------------- balance of tendon and fibre
-
-
-@jit
-def forces(law, activation, damping, height, ratio, reach, x, before, rate):
-    """Return forces [F_max] and slopes: the tendon's, its slope in x, the fibre's along the tendon, its slope in x, the
-    tendon's slope in its length [l_s], the fibre's in activation and in velocity [v_max l_o].
-
-    height, x, before [l_o]: fibre height, length now and before; ratio l_o / l_s; reach: unit's length [l_s];
-    rate: one over (v_max x duration), zero where the fibre is at rest. x must be above height.
-    """
-    along = math.sqrt(x * x - height * height)
-    cosine = along / x
-    pull, stiffness = tendon_curve(law, reach - ratio * along)
-    active, d_active, passive, d_passive = length_curves(law, x)
-    v = (x - before) * rate
-    speed, d_speed = velocity_curve(law, v)
-    force = activation * active * speed + passive + damping * v
-    slope = activation * (d_active * speed + active * d_speed * rate) + d_passive + damping * rate
-    turning = force * height * height / (along * x * x)
-    drag = (activation * active * d_speed + damping) * cosine
-    return (
-        pull, -stiffness * ratio / cosine, force * cosine, slope * cosine + turning,
-        stiffness, active * speed * cosine, drag,
-    )  # fmt: skip
-
-
-@jit
-def rest_imbalance(law, activation, height, ratio, reach, x):
-    """Return the tendon's force less that of a fibre at rest [F_max] and the slope in x; arguments as of `forces`."""
-    pull, d_pull, force, d_force, _, _, _ = forces(law, activation, 0.0, height, ratio, reach, x, x, 0.0)
-    return pull - force, d_pull - d_force
-
-
-@jit
-def balance(law, activation, damping, height, ratio, reach, before, rate, low, high, start, close):
-    """Return the fibre length [l_o] in [low, high] that balances, the tendon's force [F_max], evaluations and status.
-
-    The tendon must pull no less than the fibre at `low`, else the fibre rests there, and no more at `high`. Newton's
-    steps from `start`, kept in a bracket that every evaluation narrows. A step taken within `close` [F_max] of balance
-    is the last, unless it crosses the tendon's slack length, where the slope jumps; with close zero the steps end at
-    rounding.
-    """
-    least, x, pull = low, start, 0.0
-    low_known = high_known = False
-    along = max(reach - 1.0, 0.0) / ratio
-    slack = math.sqrt(along * along + height * height)  # at this fibre length the tendon begins to pull
-    along = max(reach - STRAINED, 0.0) / ratio
-    strained = min(max(math.sqrt(along * along + height * height), low), high)
-    x = max(x, strained)
-    for k in range(1, MOST + 1):
-        pull, d_pull, force, d_force, _, _, _ = forces(
-            law, activation, damping, height, ratio, reach, x, before, rate
-        )
-        off, slope = pull - force, d_pull - d_force
-        if off <= 0.0 and x <= least:
-            return least, pull, k, AT_MINIMUM
-        step = -off / slope if slope < 0.0 else 0.0
-        if off > STEEP and law != MILLARD and force >= 0.0:
-            # the tendon's exponential outweighs all else: the logarithms of both forces are nearly straight
-            bend = d_pull / (pull + OFFSET) - d_force / (force + OFFSET)
-            step = -math.log((pull + OFFSET) / (force + OFFSET)) / bend if bend < 0.0 else 0.0
-        new = x + step
-        if abs(step) <= 1e-15 * x and abs(off) <= CLOSE:
-            return x, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
-        if abs(off) <= close and slope < 0.0 and new > least and (x < slack) == (new < slack):
-            pull = max(pull + d_pull * step, 0.0)
-            return new, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
-        if off > 0.0:
-            low, low_known = x, True
-        else:
-            high, high_known = x, True
-        if step == 0.0 or (new <= low and low_known) or (new >= high and high_known):
-            new = 0.5 * (low + high)
-        new = min(max(new, low if x <= strained else max(low, strained)), high)
-        if new == x:  # the bracket has no number inside
-            return x, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
-        x = new
-    return x, pull, MOST, NOT_CONVERGED
-
-
 @jit
 def advance_fiber(law, params, m, activation, length, fiber, duration):
     """Return fibre length [m], tension [N], evaluations and status after one backward Euler step of `duration` [s].
@@ -255,58 +137,66 @@ def step_fiber(
     """
     if params[m, ELASTIC] == 0.0 or duration <= 0.0:
         return _at_once(law, params, m, activation, length, fiber, duration)
-    optimal, slack, damping, fastest = (
+    optimal, slack, fastest, damping = (
         params[m, OPTIMAL],
         params[m, SLACK],
-        params[m, DAMPING],
         params[m, V_MAX],
+        params[m, DAMPING],
     )
     height, least = params[m, HEIGHT] / optimal, params[m, LEAST] / optimal
-    ratio, reach = optimal / slack, length / slack
+    ratio, reach, rise = optimal / slack, length / slack, (length - length_before) / slack
+    activation_before = min(max(activation_before, 0.0), 1.0)
     activation = min(max(activation, 0.0), 1.0)
-    before = max(fiber / optimal, least)
-    taut = _taut(params, m, length)
+    start = max(fiber / optimal, least)
+    high = max(_taut(params, m, length), start)
     span = duration * fastest
-    v = fiber_rate(law, params, m, activation_before, length_before, before * optimal) / (fastest * optimal)
-    x, pull, count, status = balance(
-        law,
-        activation,
-        damping,
-        height,
-        ratio,
-        reach,
-        before,
-        1.0 / span,
-        least,
-        max(taut, before),
-        before,
-        LOOSE,
+    # the beginning, and from its slopes the end
+    v_before, (_, d_pull, _, d_force, stiffness, strength, drag) = balanced_forces(
+        law, activation_before, damping, height, ratio, reach - rise, start, least, GUESS
     )
-    if status != AT_MINIMUM and status != NOT_CONVERGED:
-        _, d_pull, _, d_force, stiffness, strength, drag = forces(
-            law, activation, damping, height, ratio, reach, x, before, 1.0 / span
+    x, v, count, known = start, v_before, 0, False
+    if drag > 0.0:
+        bend = (d_pull - d_force) / drag
+        forcing = (stiffness * speed / slack - strength * activation_rate) / drag
+        reduced = span * (2.0 / 3.0 - min(span * bend, 1.0) / 6.0)
+        ahead = span * (v_before / 3.0 - duration * forcing / 6.0)
+        change = bend * ahead + (stiffness * rise - strength * (activation - activation_before)) / drag
+        v = (v_before + change) / (1.0 - bend * reduced) if bend * reduced < 0.9 else math.nan
+        x = start + ahead + reduced * v
+        known = abs(v - v_before) <= WILD and least < x < high
+    if known:
+        pull, d_pull, force, d_force, stiffness, strength, drag = forces(
+            law, activation, damping, height, ratio, reach, x, v
         )
-        if drag > 0.0:
-            growth = min(span * (d_pull - d_force) / drag + 1.0, 1.0)  # λ duration
-            forcing = (stiffness * speed / slack - strength * activation_rate) / drag
-            before += span * (v / 3.0 - duration * forcing / 6.0)
-            rate = 1.0 / (span * (2.0 / 3.0 - growth / 6.0))
-            x, pull, more, status = balance(
-                law,
-                activation,
-                damping,
-                height,
-                ratio,
-                reach,
-                before,
-                rate,
-                least,
-                max(taut, before),
-                x,
-                CLOSE,
-            )
-            count += more + 1
-    return x * optimal, pull * params[m, F_MAX], count, status
+        count, known = 1, abs(pull - force) <= SURE and drag > 0.0
+    if not known:
+        x, pull, more, status = balance(
+            law, activation, damping, height, ratio, reach, start, 1.0 / span, least, high, start, CLOSE
+        )
+        count += more
+        v = (x - start) / span
+        if status in (AT_MINIMUM, NOT_CONVERGED) or not abs(v - v_before) <= WILD:
+            return x * optimal, pull * params[m, F_MAX], count, status
+        euler = pull
+        pull, d_pull, force, d_force, stiffness, strength, drag = forces(
+            law, activation, damping, height, ratio, reach, x, v
+        )
+        count += 1
+        if drag <= 0.0:
+            return x * optimal, euler * params[m, F_MAX], count, status
+    growth = min(span * (d_pull - d_force) / drag, 1.0)  # λ duration
+    forcing = (stiffness * speed / slack - strength * activation_rate) / drag
+    before = start + span * (v_before / 3.0 - duration * forcing / 6.0)
+    rate = 1.0 / (span * (2.0 / 3.0 - growth / 6.0))
+    # Newton's step from the prediction, whose velocity is not yet that of the scheme
+    slope = d_pull - d_force - drag * rate
+    off = pull - force - drag * ((x - before) * rate - v)
+    if slope < 0.0:
+        x = min(max(x - off / slope, least), high)
+    x, pull, more, status = balance(
+        law, activation, damping, height, ratio, reach, before, rate, least, max(high, before), x, CLOSE
+    )
+    return x * optimal, pull * params[m, F_MAX], count + more, status
 
 
 @jit
@@ -400,35 +290,8 @@ def fiber_rate(law, params, m, activation, length, fiber):
     along = math.sqrt(max(x * x - height * height, 0.0))
     pull, _ = tendon_curve(law, (length - along * optimal) / slack)
     active, _, passive, _ = length_curves(law, x)
-    strength = activation * active
     wanted = pull * x / along - passive if along > 0.0 else math.inf  # at a right angle
-    v = _balancing_velocity(law, strength, damping, wanted)
+    v, _, _ = balancing_velocity(law, activation * active, damping, wanted, EXACT)
     if fiber <= params[m, LEAST] and v < 0.0:
         return 0.0
     return v * params[m, V_MAX] * optimal
-
-
-@jit
-def _balancing_velocity(law, strength, damping, wanted):
-    """Return v with strength f_v(v) + damping v = wanted, kept within a bound."""
-    if damping == 0.0 and strength == 0.0:
-        return FASTEST if wanted > 0.0 else (-FASTEST if wanted < 0.0 else 0.0)
-    low, high, v = -FASTEST, FASTEST, 0.0
-    if damping == 0.0:
-        v = inverse_velocity(law, wanted / strength)
-        return min(max(v, low), high)
-    for _ in range(2 * MOST):
-        force, slope = velocity_curve(law, v)
-        off = wanted - strength * force - damping * v
-        if off > 0.0:
-            low = v
-        else:
-            high = v
-        slope = strength * slope + damping
-        new = v + off / slope if slope > 0.0 else math.inf
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - v) <= 1e-15 * (1.0 + abs(v)):
-            return new
-        v = new
-    return v

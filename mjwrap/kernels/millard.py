@@ -6,11 +6,15 @@ velocities (lengthening positive), tendon lengths in slack lengths, forces in ma
 
 from __future__ import annotations
 
+import numpy as np
+
 from mjwrap.kernels import bezier
 from mjwrap.kernels._jit import jit
 
 CODE = 3
 LEAST = 0.4441  # shortest fibre that can pull [l_o]
+FASTEST = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
+MOST = 80  # Newton steps and bisections for a velocity; three or four are normal
 
 
 def _active():
@@ -63,28 +67,33 @@ def _tendon():
     return bezier.corners([(1.0, 0.0, 0.0, x, y, slope), (x, y, slope, x_toe, toe, stiffness)], [0.5, 0.5])
 
 
-_ACTIVE, _ACTIVE_CUBICS = _active()
-_VELOCITY, _VELOCITY_CUBICS = _velocity()
-_PASSIVE, _PASSIVE_CUBICS = _passive()
-_TENDON, _TENDON_CUBICS = _tendon()
+_ACTIVE = _active()
+_ACTIVE_PIECES, _ACTIVE_CELLS = bezier.tabulate(_ACTIVE)
+_VELOCITY = _velocity()
+_VELOCITY_PIECES, _VELOCITY_CELLS = bezier.tabulate(_VELOCITY)
+_VELOCITIES = np.array([bezier.inverse(_VELOCITY, f) for f in np.linspace(0.0, 1.4, 65)])
+_PASSIVE = _passive()
+_PASSIVE_PIECES, _PASSIVE_CELLS = bezier.tabulate(_PASSIVE)
+_TENDON = _tendon()
+_TENDON_PIECES, _TENDON_CELLS = bezier.tabulate(_TENDON)
 
 
 @jit
 def active(x):
     """Active force-length curve; zero at 0.4441 and below, and at 1.8123 and above (damped: no minimum force)."""
-    return bezier.evaluate(_ACTIVE, _ACTIVE_CUBICS, x)
+    return bezier.evaluate(_ACTIVE_PIECES, _ACTIVE_CELLS, x)
 
 
 @jit
 def passive(x):
     """Passive force-length curve: zero up to optimal fibre length, one at 1.7."""
-    return bezier.evaluate(_PASSIVE, _PASSIVE_CUBICS, x)
+    return bezier.evaluate(_PASSIVE_PIECES, _PASSIVE_CELLS, x)
 
 
 @jit
 def velocity(v):
     """Force-velocity curve: zero at -1 and below, 1.4 at 1 and above."""
-    return bezier.evaluate(_VELOCITY, _VELOCITY_CUBICS, v)
+    return bezier.evaluate(_VELOCITY_PIECES, _VELOCITY_CELLS, v)
 
 
 @jit
@@ -94,9 +103,48 @@ def inverse_velocity(force):
 
 
 @jit
+def balancing_velocity(strength, damping, wanted, close):
+    """Return v with strength f_v(v) + damping v = wanted, and f_v and its slope there; one of the factors is above 0.
+
+    The start takes the curve as straight from rest to where it alone would balance; Newton's steps are kept in a
+    bracket. The last step is at most `close`; the error left is its square.
+    """
+    low, high = -FASTEST, FASTEST
+    v = 0.0
+    excess = wanted - strength
+    if strength > 0.0:
+        force = min(max(wanted / strength, 0.0), 1.4)
+        place = force * (64 / 1.4)
+        k = min(int(place), 63)
+        v = _VELOCITIES[k] + (place - k) * (_VELOCITIES[k + 1] - _VELOCITIES[k])
+        steepness = (force - 1.0) / v if abs(force - 1.0) > 0.02 else 5.0
+        v = excess / (strength * steepness + damping)
+    else:
+        v = excess / damping
+    v = min(max(v, low), high)
+    force = slope = step = 0.0
+    for _ in range(MOST):
+        force, slope = velocity(v)
+        off = wanted - strength * force - damping * v
+        if off > 0.0:
+            low = v
+        else:
+            high = v
+        steepness = strength * slope + damping
+        new = v + off / steepness if steepness > 0.0 else 2.0 * FASTEST
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        step = new - v
+        v = new
+        if abs(step) <= close * (1.0 + abs(v)):
+            break
+    return v, force + slope * step, slope
+
+
+@jit
 def tendon(x):
     """Tendon force-length curve: zero up to the slack length, one at 4.9 % strain, straight above two thirds."""
-    return bezier.evaluate(_TENDON, _TENDON_CUBICS, x)
+    return bezier.evaluate(_TENDON_PIECES, _TENDON_CELLS, x)
 
 
 @jit
