@@ -336,6 +336,20 @@ def test_limits_and_the_rest_pose_are_the_callers() -> None:
         mw.implausible(muscles, ranges={}, rest=[0.0, 0.0])
 
 
+@pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])
+def test_an_elastic_tendon_is_judged_as_a_rigid_one(
+    law: type[mw.DeGrooteFregly2016 | mw.Millard2012],
+) -> None:
+    reports = []
+    for tendon in ("rigid", "elastic"):
+        spec = mujoco.MjSpec.from_file(ELBOW)
+        mw.set_laws(spec, {"BRA": law(987.0, 0.0858, 0.005, tendon=tendon)})
+        reports.append(mw.implausible(mw.MuscleSystem(spec.compile())))
+    rigid, elastic = reports
+    assert rigid.findings == elastic.findings
+    assert {f.kind for f in elastic.findings} == {"long fibre", "passive at rest"}
+
+
 @pytest.mark.myo
 @pytest.mark.slow
 def test_the_full_body_has_160_negative_tendons() -> None:
