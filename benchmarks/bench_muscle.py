@@ -1,11 +1,11 @@
 """Time of a muscle's force and of a step of its fibre in a compiled loop, per muscle and step.
 
-Muscles of four kinds, from a short tendon to one seven times as long as its fibre, follow smooth motions of their fibres
-between 0.7 and 1.2 optimal lengths, at up to 2.4 optimal lengths a second, under excitations that switch; each kind in
-several phases. Lengths, speeds and activations are made beforehand: a step of activation is not in the figures, nor is
-a path. A step has failed where its iteration did not converge or took more than ten evaluations, where the tension is
-not finite, or where it is not that of the tendon beside the new fibre to 1e-8 of the maximum force. Times are the CPU
-time of the thread. Exit code 1 where a target is missed or a step failed, 2 for a bad argument.
+Muscles of four kinds, from a short tendon to one seven times as long as its fibre, are moved by half an optimal fibre
+length at up to 2.4 optimal lengths a second, under excitations that switch; each kind in several phases. Lengths,
+speeds and activations are made beforehand: neither a step of activation nor a path is in the figures. A step has
+failed where its iteration did not converge or took more than ten evaluations, where the tension is not finite, or
+where it is not that of the tendon beside the new fibre to 1e-8 of the maximum force. Times are the CPU time of the
+thread. Exit code 1 where a target is missed or a step failed, 2 for a bad argument.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def prepare(law: str, tendon: str, step: float) -> Motion:
 
 
 @jit(nogil=True)
-def run_rigid(code, params, signals, first, last, lengths, step, tension, counts):  # noqa: ANN001, ANN201, ARG001
+def run_rigid(code, params, signals, first, last, lengths, step, tension, counts):
     """Write the tensions (steps, n) [N] of muscles without a fibre's state."""
     for k in range(first, last):
         for m in range(params.shape[0]):
@@ -98,7 +98,7 @@ def run_rigid(code, params, signals, first, last, lengths, step, tension, counts
 
 
 @jit(nogil=True)
-def run_elastic(code, params, signals, first, last, lengths, step, tension, counts):  # noqa: ANN001, ANN201
+def run_elastic(code, params, signals, first, last, lengths, step, tension, counts):
     """Advance the fibres `lengths` (n,) [m]; write tensions and, negative where it did not converge, evaluations."""
     for k in range(first, last):
         for m in range(params.shape[0]):
@@ -110,7 +110,7 @@ def run_elastic(code, params, signals, first, last, lengths, step, tension, coun
 
 
 @jit(nogil=True)
-def run_euler(code, params, signals, first, last, lengths, step, tension, counts):  # noqa: ANN001, ANN201
+def run_euler(code, params, signals, first, last, lengths, step, tension, counts):
     """Do what `run_elastic` does with backward Euler."""
     for k in range(first, last):
         for m in range(params.shape[0]):
@@ -149,7 +149,15 @@ def measure(law: str, tendon: str, runner: Any, step: float, repeats: int) -> Ro
         for first in range(0, STEPS, BLOCK):
             began = clock()
             runner(
-                motion.code, motion.params, motion.signals, first, first + BLOCK, lengths, step, tension, scratch
+                motion.code,
+                motion.params,
+                motion.signals,
+                first,
+                first + BLOCK,
+                lengths,
+                step,
+                tension,
+                scratch,
             )
             times.append((clock() - began) / (1e3 * BLOCK * n))
     row: Row = {"median": float(np.median(times)), "p95": float(np.percentile(times, 95))}
@@ -183,7 +191,9 @@ def verdict(label: str, row: Row) -> str:
 
 def main() -> int:
     """Run the benchmark; return the exit code."""
-    parser = argparse.ArgumentParser(description="Time of muscle forces and of fibre steps in a compiled loop.")
+    parser = argparse.ArgumentParser(
+        description="Time of muscle forces and of fibre steps in a compiled loop."
+    )
     parser.add_argument("--repeats", type=int, default=30, help="runs of each motion (default 30)")
     parser.add_argument("--step", type=float, default=2e-3, help="duration of a step [s] (default 0.002)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to FILE")

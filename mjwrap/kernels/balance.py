@@ -17,9 +17,9 @@ AT_MINIMUM = 1  # the fibre is at its minimum length, and does not balance the t
 SLACK_TENDON = 2  # no tension; the fibre's own force is zero too
 NOT_CONVERGED = 3
 
-MOST = 60  # evaluations in one solution; a step of a simulation takes two or three
+MOST = 150  # evaluations in one solution; a step of a simulation takes two or three
 CLOSE = 1e-6  # [F_max] imbalance from which one more Newton step ends far below 1e-8
-SMALL = 1e-6  # [l_s] largest such step: the curvature of a tendon's curve is at most 2e3
+SMALL = 1e-6  # [l_s] largest such step of the tendon: the curvature of a tendon's curve is at most 2e3
 STRAINED = 1.08  # [l_s] tendon length from which at most the iteration starts
 # [F_max] imbalance above which an exponential tendon is taken by its logarithm, and what is added to the forces for it
 STEEP, OFFSET = 0.2, 0.2
@@ -179,8 +179,8 @@ def balance(law, activation, damping, height, ratio, reach, before, rate, low, h
         if abs(step) <= 1e-15 * x and abs(off) <= CLOSE:
             return x, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
         if (
-            abs(off) <= close and abs(step) * ratio <= small
-            and slope < 0.0 and new > least and (x < slack) == (new < slack)
+            abs(off) <= close and slope < 0.0 and new > least and (x < slack) == (new < slack)
+            and abs(step) * ratio * x <= small * math.sqrt(x * x - height * height)
         ):  # fmt: skip
             pull = max(pull + d_pull * step, 0.0)
             return new, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL

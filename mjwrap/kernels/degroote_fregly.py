@@ -18,9 +18,8 @@ PASSIVE_OFFSET = math.exp(PASSIVE_STIFFNESS * (LEAST - 1.0))
 PASSIVE_SCALE = math.exp(4.0) - PASSIVE_OFFSET
 D1, D2, D3, D4 = -0.3211346127989808, -8.149, -0.374, 0.8825327733249912
 TENDON_STIFFNESS = math.log(6.0) / 0.049
-WIDEST = (
-    8.0  # |asinh| of the force-velocity curve's argument beyond which no velocity is looked for: 180 v_max
-)
+HIGHEST = 100.0  # exponent from which an exponential goes on straight, so that no force is infinite
+WIDEST = 8.0  # |asinh| of the force-velocity curve's argument at 180 v_max: faster is not looked for
 MOST = 60  # Newton steps; three or four are normal
 
 
@@ -45,10 +44,18 @@ def active(x):
 
 
 @jit
+def _exponential(z):
+    """Return exp(z) and its slope."""
+    low = min(z, HIGHEST)
+    slope = math.exp(low)
+    return slope * (1.0 + (z - low)), slope
+
+
+@jit
 def passive(x):
     """Passive force-length curve, exponential, zero at 0.2 and one at 1.6 optimal fibre lengths."""
-    grown = math.exp(PASSIVE_STIFFNESS * (x - 1.0))
-    return (grown - PASSIVE_OFFSET) / PASSIVE_SCALE, grown * (PASSIVE_STIFFNESS / PASSIVE_SCALE)
+    value, slope = _exponential(PASSIVE_STIFFNESS * (x - 1.0))
+    return (value - PASSIVE_OFFSET) / PASSIVE_SCALE, slope * (PASSIVE_STIFFNESS / PASSIVE_SCALE)
 
 
 @jit
@@ -100,8 +107,8 @@ def balancing_velocity(strength, damping, wanted, close):
 @jit
 def tendon(x):
     """Tendon force-length curve, one at 4.9 % strain. Negative below the slack length: whoever uses it clamps it."""
-    grown = 0.2 * math.exp(TENDON_STIFFNESS * (x - 1.0))
-    return grown - 0.2, TENDON_STIFFNESS * grown
+    value, slope = _exponential(TENDON_STIFFNESS * (x - 1.0))
+    return 0.2 * value - 0.2, 0.2 * TENDON_STIFFNESS * slope
 
 
 @jit
