@@ -37,6 +37,18 @@ print(json.dumps({
                 *path.points(0.01).ravel().tolist()],
     "converged": bool(path.converged), "folder": _jit._CACHE}))
 """
+# The same path as a sweep, which calls compiled code that a solution of one path has kept already.
+SWEEP = (
+    SOLVE.split("path =")[0]
+    + """
+import numpy as np
+from mjwrap.kernels import _jit
+pos = np.tile([[0.0, 0.0, 0.0], [-0.06, 0.01, 0.01], [-0.1, 0.0, 0.01]], (3, 1, 1))
+quat = np.tile([1.0, 0.0, 0.0, 0.0], (3, 3, 1))
+sweep = mw.solve_sweep((0.1, 0.01, 0.0), (-0.2, 0.0, 0.02), row, pos, quat)
+print(json.dumps({"numbers": sweep.length.tolist(), "folder": _jit._CACHE}))
+"""
+)
 # A kernel that compiles in seconds, and that calls one in another file.
 PULL = """
 import json, numpy as np
@@ -123,6 +135,21 @@ def test_uncompiled_kernels_find_the_same(starts: Starts) -> None:
     assert plain.told == []
     # without fused multiply-adds: some rounding errors more, along a handful of Newton iterations
     assert plain.numbers == pytest.approx(starts.first.numbers, rel=1e-11, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_machine_code_that_calls_other_code_finds_it(starts: Starts) -> None:
+    """Large kernels are called by a symbol: its address has to be there before the caller, wherever that is kept."""
+    assert run(SWEEP, starts.home).told  # links what the first start kept
+    kept = list(starts.first.folder.rglob("geodesics.geodesic-*"))
+    assert kept
+    for path in kept:
+        path.unlink()
+    found = run(SWEEP, starts.home)
+    assert len(found.told) == 1
+    assert run(SWEEP, starts.home).told == []
+    assert run(SOLVE, starts.home).numbers == starts.first.numbers
+    assert found.numbers == pytest.approx(starts.first.numbers[:1] * 3, rel=1e-13)
 
 
 # ----------------------------------------------------------------------- never older than its sources

@@ -19,8 +19,9 @@ import numba
 from numba.core import config as numba_config
 from numba.core import event
 
+from mjwrap.kernels._kernel import Apart, Hidden, Kernel
+
 config: Any = numba_config  # its variables, set from the environment, are not known to type checkers
-njit: Any = numba.njit
 F = TypeVar("F", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
 _NOTICE = "mjwrap: compiling its kernels, once for this machine and version (about half a minute) ..."
@@ -95,11 +96,40 @@ _CACHE = str(cache_dir())
 event.register("numba:compile", _Announcer())
 
 
-def jit(function: F) -> F:
-    """Compile a kernel: no GIL, IEEE semantics but for fused multiply-adds, machine code kept on disk."""
+_OPTIONS: dict[str, Any] = {
+    "nopython": True,
+    "boundscheck": None,  # by NUMBA_BOUNDSCHECK
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cfunc_wrapper": True,
+}
+
+
+def jit(function: F, kind: type[Kernel] = Kernel, **options: bool) -> F:
+    """Compile a kernel: no GIL, IEEE semantics but for fused multiply-adds, machine code kept on disk.
+
+    One whose name begins with an underscore cannot be called from Python, which makes it cheaper to compile.
+    """
+    if config.DISABLE_JIT:
+        return function
+    if function.__name__.startswith("_"):
+        kind, options = Hidden, options | {"no_cpython_wrapper": True}
     before = config.CACHE_DIR
     config.CACHE_DIR = _CACHE  # read by numba when the function is decorated
     try:
-        return njit(function, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+        kernel: Any = kind(function, _OPTIONS | options)
+        kernel.enable_caching()
+        return kernel
     finally:
         config.CACHE_DIR = before
+
+
+def apart(function: F) -> F:
+    """Compile a kernel whose code callers do not take over: a large one, to which a call is nothing."""
+    return jit(function, Apart)
+
+
+def inlined(function: F) -> F:
+    """Compile a kernel that every caller takes over: a small one, called with constants."""
+    return jit(function, forceinline=True)

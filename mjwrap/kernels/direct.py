@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.ruled import (
     A_INSIDE,
@@ -105,7 +105,7 @@ def closed_form(kind):
     return kind <= lay.SPHERE or kind == lay.CONE or kind == lay.ELLIPTIC_CYLINDER
 
 
-@jit
+@apart
 def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import inlined, jit
 
 ROT = lay.ROT
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
 W_KP, W_KQ, W_JAC, W_KMIN, W_RMIN = lay.W_KP, lay.W_KQ, lay.W_JAC, lay.W_KMIN, lay.W_RMIN
 
 
-@jit
+@inlined
 def rotate(node, k, column, x, y, z):
     """Write the vector (x, y, z) of S, turned into the world, to node[k, column:column + 3]."""
     node[k, column] = node[k, ROT] * x + node[k, ROT + 1] * y + node[k, ROT + 2] * z
@@ -20,7 +20,7 @@ def rotate(node, k, column, x, y, z):
     node[k, column + 2] = node[k, ROT + 6] * x + node[k, ROT + 7] * y + node[k, ROT + 8] * z
 
 
-@jit
+@inlined
 def cross(node, k, out, left, right):
     """Write node[left] x node[right] (column triples of row k) to column `out`."""
     ax, ay, az = node[k, left], node[k, left + 1], node[k, left + 2]
@@ -30,7 +30,7 @@ def cross(node, k, out, left, right):
     node[k, out + 2] = ax * by - ay * bx
 
 
-@jit
+@inlined
 def put_start(node, k, x, y, z, tx, ty, tz, nx, ny, nz):
     """Write P, t_P, n_P, given in S, to the row in world directions."""
     rotate(node, k, W_P, x, y, z)
@@ -38,7 +38,7 @@ def put_start(node, k, x, y, z, tx, ty, tz, nx, ny, nz):
     rotate(node, k, W_NP, nx, ny, nz)
 
 
-@jit
+@inlined
 def put_end(node, k, x, y, z, tx, ty, tz, nx, ny, nz):
     """Write Q, t_Q, n_Q, given in S, to the row in world directions."""
     rotate(node, k, W_Q, x, y, z)
@@ -46,7 +46,7 @@ def put_end(node, k, x, y, z, tx, ty, tz, nx, ny, nz):
     rotate(node, k, W_NQ, nx, ny, nz)
 
 
-@jit
+@inlined
 def put_curvature(node, k, column, kappa, tau, beta):
     """Write kappa, tau, beta of one end to the row."""
     node[k, column] = kappa
@@ -54,7 +54,7 @@ def put_curvature(node, k, column, kappa, tau, beta):
     node[k, column + 2] = beta
 
 
-@jit
+@inlined
 def put_fields(node, k, a, da, r, dr, least_curvature, least_field):
     """Write the Jacobi fields at Q and what the whole geodesic is judged by."""
     node[k, W_JAC] = a

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.closed_forms import capsule, cone, cylinder, sphere
 from mjwrap.kernels.custom import custom_geodesic
 from mjwrap.kernels.frames import cross
@@ -22,7 +22,7 @@ KIND, POS = lay.KIND, lay.POS
 S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
 
 
-@jit
+@apart
 def geodesic(k, node, base_x, base_y, base_z):
     """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import apart, inlined, jit
 from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.shape import into_frame, project
 
@@ -33,7 +33,7 @@ MAX_HALVINGS = 6
 SHORTEST = 1e-150  # keeps the reciprocal of a vanishing segment finite [m]
 
 
-@jit
+@inlined
 def _dot(node, j, left, k, right):
     """Return the dot product of two column triples of two rows."""
     return (
@@ -66,7 +66,7 @@ def _leave(j, ex, ey, ez, size, ends, node):
     return _share(along, normal, binormal, size)
 
 
-@jit
+@inlined
 def _share(along, normal, binormal, size):
     """Return one end's share of ||f||^2; nothing where the segment is so short that its direction says no more."""
     share = (1.0 - along) ** 2 + normal * normal + binormal * binormal
@@ -297,7 +297,7 @@ def _pin(lo, hi, ends, node):
     return False
 
 
-@jit
+@apart
 def newton(lo, hi, ends, node, tol, max_iterations, square=-1.0):
     """Iterate until ||f|| <= tol; return (||f||, iterations, evaluations), the last state left in `state`.
 

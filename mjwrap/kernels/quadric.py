@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.frames import put_curvature, put_end, put_fields, put_start
 from mjwrap.kernels.stoermer import (
     DOUBT,
@@ -54,7 +54,7 @@ def onto(ia, ib, ic, x, y, z):
     return scale * x, scale * y, scale * z
 
 
-@jit
+@inlined
 def _substep(v, first, last, k, cx, cy, cz, d):
     """Take substep k of the columns first..last: g, a, r in rows 0..4 of v, their differences in rows 5..9."""
     for i in range(first, last):

@@ -53,7 +53,7 @@ def _following(k, hi, ends, node, centred):
 
 
 @jit
-def relax(lo, hi, ends, node, passes, centred=False):
+def relax(lo, hi, ends, node, passes, centred):
     """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`.
 
     Lost contacts are searched for in some of the passes.
@@ -156,7 +156,7 @@ def shorten(lo, hi, ends, node, passes):
                 before = path_length(first, last, part, node)
                 _keep(first, last, node, W_OLD, False)
                 _other_way(k, k + run, node)
-                spent += relax(first, last, part, node, passes)
+                spent += relax(first, last, part, node, passes, False)
                 if path_length(first, last, part, node) < before * (1.0 - 1e-9):
                     shorter = True
                     continue
@@ -166,7 +166,7 @@ def shorten(lo, hi, ends, node, passes):
                         geodesic(j, node, ends[0], ends[1], ends[2])
         if not shorter or hi - lo == 1:
             break
-        spent += relax(lo, hi, ends, node, passes)
+        spent += relax(lo, hi, ends, node, passes, False)
     return spent
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.geodesics import displace, geodesic
@@ -109,7 +109,7 @@ def _slip_off(lo, hi, ends, node, sign):
         ends[0], ends[1], ends[2], node[failed, q], node[failed, q + 1], node[failed, q + 2],
         ends[6], ends[7], ends[8],
     )  # fmt: skip
-    relax(failed + 1, hi, ends, node, 1)
+    relax(failed + 1, hi, ends, node, 1, False)
 
 
 @jit
@@ -147,7 +147,7 @@ def _ends_short(lo, hi, node):
     return last >= 0 and node[last, lay.W_LQ] <= ON_SURFACE * node[last, lay.SIZE]
 
 
-@jit
+@apart
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
@@ -177,7 +177,7 @@ def _solve(lo, hi, ends, node, tol, direct):
     if cold and hi - lo > 1 and not _all_hinted(lo, hi, node):
         evaluations += search_rows(lo, hi, ends, node, COLD_PASSES)
     elif cold or (direct and hi - lo == 1):
-        evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node))
+        evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node), False)
         if cold and hi - lo == 1 and closed_form(node[lo, lay.KIND]):
             evaluations += shorten(lo, hi, ends, node, 1)
     _remember(lo, hi, node)
@@ -219,7 +219,7 @@ def _solve(lo, hi, ends, node, tol, direct):
         elif saddle:
             _slip_off(lo, hi, ends, node, 1.0 if repairs % 2 == 0 else -1.0)
         passes = (REPAIR_PASSES + repairs) << repairs if hi - lo > 1 else 1
-        evaluations += relax(lo, hi, ends, node, passes)
+        evaluations += relax(lo, hi, ends, node, passes, False)
         repairs += 1
         changes = 0
     if not settled:

@@ -23,7 +23,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from mjwrap.kernels._jit import config, jit
+from mjwrap.kernels._jit import config, inlined
 
 LANES = 8
 ROWS = 10  # of doubles that a step keeps for each lane
@@ -69,7 +69,7 @@ stack: Any = _plain_stack if config.DISABLE_JIT else intrinsic(_stack)
 carray: Any = getattr(numba, "carray")  # noqa: B009, not declared for type checkers
 
 
-@jit
+@inlined
 def combine(v, row, weight):
     """Return the weighted sum over the lanes of a row of v."""
     return (

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.frames import put_curvature, put_end, put_fields, put_start
 from mjwrap.kernels.stoermer import (
     DOUBT,
@@ -41,7 +41,7 @@ def _force(rho, z, major, ir, c2):
     return q * w - kappa * cv, -kappa * (z * ir), -ir * w * cv, w * w
 
 
-@jit
+@inlined
 def _substep(v, first, last, k, hh, p, z, a, r, major, ir, c2):
     """Take substep k of the columns first..last: increments in rows 0..3 of v, their differences in 4..7, the sum in
     8.

@@ -1,0 +1,96 @@
+"""How a kernel is compiled for its callers: once for every set of types, and, where wished, apart from them.
+
+numba compiles a function anew for every constant argument, and puts the machine code of all that it calls, directly or
+not, into its own, optimised once more at every level. Kernels do without the first; the large ones do without the
+second: their callers hold a call of a symbol, which is given an address where the callee is compiled or loaded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+from functools import partial
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba.core import cgutils, sigutils, types
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher
+
+Dispatcher: Any = CPUDispatcher
+
+
+class Kernel(Dispatcher):
+    """A compiled function. Constants among its arguments count as values of their type."""
+
+    def __init__(self, function: Any, options: dict[str, Any]) -> None:
+        super().__init__(py_func=function, locals={}, targetoptions=options, pipeline_class=Compiler)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how compiled code calls it with arguments of these types."""
+        return super().get_call_template(
+            tuple(map(types.unliteral, args)), {key: types.unliteral(kind) for key, kind in kws.items()}
+        )
+
+    def add_overload(self, cres: Any) -> None:
+        """Enter a compiled or loaded version; what has to be loaded with it has to be with its callers, too."""
+        cres.library._reload_init.update(cres.reload_init)
+        super().add_overload(cres)
+
+
+class Hidden(Kernel):
+    """A compiled function that only compiled functions call: without the wrapper through which Python would."""
+
+    def __call__(self, *args: Any) -> Any:
+        """Say what to do instead."""
+        raise TypeError(
+            f"{self.py_func.__name__} can be called from compiled kernels only; use its `py_func`"
+        )
+
+
+class Apart(Kernel):
+    """A compiled function whose code is not copied into its callers'."""
+
+    def __init__(self, function: Any, options: dict[str, Any]) -> None:
+        super().__init__(function, options)
+        self._calls: dict[Any, object] = {}
+
+    def get_overload(self, sig: Any) -> Any:
+        """Return what stands for a version in compiled code: a call of its symbol."""
+        args = tuple(sigutils.normalize_signature(sig)[0])
+        if args not in self._calls:
+            cres, key = self.overloads[args], object()
+            name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
+            symbol = f"{name}.{hashlib.sha256(str(args).encode()).hexdigest()[:16]}"
+            llvm.add_symbol(symbol, cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name))
+            load = partial(_load, self.py_func.__module__, self.py_func.__qualname__, args)
+            self.targetctx._defns[key].append(_call(cres.fndesc, symbol, load), args)
+            self._calls[args] = key
+        return self._calls[args]
+
+
+def _load(module: str, name: str, args: Any) -> None:
+    """Give the symbol of a version its address: before machine code is loaded that calls it."""
+    kernel = getattr(importlib.import_module(module), name)
+    kernel.compile(args)
+    kernel.get_overload(args)
+
+
+def _call(fndesc: Any, symbol: str, load: Any) -> Any:
+    """Return what writes the call of a version by its symbol; `load` goes with the machine code of the caller."""
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        context.active_code_library._reload_init.add(load)
+        convention = context.call_conv
+        kind: ir.FunctionType = convention.get_function_type(fndesc.restype, fndesc.argtypes)
+        function = cgutils.get_or_insert_function(builder.module, kind, symbol)
+        status, value = convention.call_function(
+            builder, function, fndesc.restype, fndesc.argtypes, arguments
+        )
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return value
+
+    write.signature = fndesc.argtypes  # pyright: ignore[reportFunctionMemberAccess]
+    return write
