@@ -16,6 +16,7 @@ KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
 
 SPACING = 0.4  # of the smallest radius of curvature: between samples of a surface that is not convex
 MOST_SAMPLES = 200
+DEEP, LOCATED = 1e-3, 1e-3  # a dip that is so deep is located to so much, both in the surface's size
 REFINEMENTS = 25  # of a dip between samples, by the golden section
 EDGE = 1e-3  # of the spacing: how near to the ends of a segment a dip is looked for
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -97,6 +98,8 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
             h_one = _along(node, k, one, ax, ay, az, dx, dy, dz)
             h_two = _along(node, k, two, ax, ay, az, dx, dy, dz)
             for _ in range(REFINEMENTS):
+                if min(h_one, h_two) < -DEEP * node[k, SIZE] and (hi - lo) * size < LOCATED * node[k, SIZE]:
+                    break
                 if h_one < h_two:
                     hi, two, h_two = two, one, h_one
                     one = hi - GOLDEN * (hi - lo)
@@ -153,7 +156,10 @@ def dip(node, k, ax, ay, az, bx, by, bz):
             )
             half = math.sqrt(max(gap, 0.0) / square)
             first, last = _clamp(middle - half), _clamp(middle + half)
-        share = first
+        if kind == lay.TORUS and dz != 0.0:  # nor is anything low above or below a ring
+            one, two = (-node[k, DIM + 1] - az) / dz, (node[k, DIM + 1] - az) / dz
+            first, last = max(first, min(one, two)), min(last, max(one, two))
+        share = min(first, 1.0)
         if last > first:
             share = _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz)
     return _along(node, k, share, ax, ay, az, dx, dy, dz), share

@@ -30,6 +30,10 @@ MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in radii
 MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in radii
 MAX_HALVINGS = 6
+UNKNOWN, GEODESICS = (
+    -1.0,
+    -2.0,
+)  # what the rows hold of their start, in the place of ||f||^2: nothing, or geodesics
 SHORTEST = 1e-150  # keeps the reciprocal of a vanishing segment finite [m]
 
 
@@ -77,16 +81,26 @@ def _share(along, normal, binormal, size):
 def evaluate(lo, hi, ends, node):
     """Evaluate all touched obstacles of nodes lo..hi and the straight segments between; return ||f||^2.
 
-    Where an end point lies on a surface there is no straight segment whose direction could differ from t.
     ends = (base x, y, z, A x, y, z, B x, y, z): A and B relative to the base point [m].
     """
-    gx, gy, gz, x, y, z, bx, by, bz = ends
+    for k in range(lo, hi):
+        if node[k, S_MODE] == TOUCHED:
+            geodesic(k, node, ends[0], ends[1], ends[2])
+    return _connect(lo, hi, ends, node)
+
+
+@jit
+def _connect(lo, hi, ends, node):
+    """Put straight segments between the geodesics that the rows hold; return ||f||^2.
+
+    Where an end point lies on a surface there is no straight segment whose direction could differ from t.
+    """
+    _, _, _, x, y, z, bx, by, bz = ends
     total = 0.0
     last = -1
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED:
             continue
-        geodesic(k, node, gx, gy, gz)
         dx, dy, dz = node[k, W_P] - x, node[k, W_P + 1] - y, node[k, W_P + 2] - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
         short = size <= ON_SURFACE * node[k, SIZE]
@@ -298,15 +312,15 @@ def _pin(lo, hi, ends, node):
 
 
 @apart
-def newton(lo, hi, ends, node, tol, max_iterations, square=-1.0):
+def newton(lo, hi, ends, node, tol, max_iterations, square=UNKNOWN):
     """Iterate until ||f|| <= tol; return (||f||, iterations, evaluations), the last state left in `state`.
 
-    square: ||f||^2 where the rows hold the evaluation of their start, else negative. A step that does not reduce
-    ||f|| is halved; the iteration stops where halving does not help.
+    square: ||f||^2 where the rows hold the evaluation of their start, else GEODESICS or UNKNOWN. A step that does not
+    reduce ||f|| is halved; the iteration stops where halving does not help.
     """
     evaluations = 0
     if square < 0.0:
-        square = evaluate(lo, hi, ends, node)
+        square = _connect(lo, hi, ends, node) if square == GEODESICS else evaluate(lo, hi, ends, node)
         evaluations = 1
     iterations = 0
     if _pin(lo, hi, ends, node):

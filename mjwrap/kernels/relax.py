@@ -62,6 +62,8 @@ def relax(lo, hi, ends, node, passes, centred):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
             qx, qy, qz = _following(k, hi, ends, node, centred)
+            if i == 0:
+                node[k, lay.W_FRESH] = -1.0
             wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i % SEARCH_EVERY == 0)
             if node[k, S_MODE] == TOUCHED:
                 x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]

@@ -18,7 +18,7 @@ from mjwrap.kernels.certify import minimal, swept
 from mjwrap.kernels.clearance import dip, tube_angle, tube_crossing
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.guess import across, guess, place, place_on_tube
-from mjwrap.kernels.newton import newton
+from mjwrap.kernels.newton import GEODESICS, UNKNOWN, newton
 from mjwrap.kernels.ruled import A_INSIDE, B_INSIDE, INSIDE, follow, set_free
 from mjwrap.kernels.shape import height, project, turn_into_frame
 from mjwrap.kernels.stoermer import carray, stack
@@ -36,9 +36,12 @@ SAME_BRANCH = 1.0  # difference of swept angles [rad] that is no whole turn
 
 
 @jit
-def _polish(k, ends, node):
-    """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length."""
-    error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, -1.0)
+def _polish(k, ends, node, known):
+    """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length.
+
+    known: what the row holds of its start, UNKNOWN or GEODESICS.
+    """
+    error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, known)
     node[k, lay.W_FRESH] = error * error
     if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and minimal(k, k + 1, node)):
         return False, 0.0
@@ -89,7 +92,7 @@ def _caught(k, ends, node, mode, x, y, z, dx, dy, dz):
     px, py, pz, nx, ny, nz = project(node, k, x, y, z)
     if mode == FREE and nx * node[k, S_T] + ny * node[k, S_T + 1] + nz * node[k, S_T + 2] < 0.0:
         place(k, node, node[k, S_P], node[k, S_P + 1], node[k, S_P + 2], dx, dy, dz, 0.0)
-        good, _ = _polish(k, ends, node)
+        good, _ = _polish(k, ends, node, UNKNOWN)
         if good:
             node[k, S_SWEEP] = 0.0
             return True
@@ -118,7 +121,7 @@ def wrap_searched(k, ends, node, search):
     if mode == TOUCHED:
         for i in range(lay.STATE):
             node[k, lay.W_LAST + i] = node[k, S_MODE + i]
-        good, _ = _polish(k, ends, node)
+        good, _ = _polish(k, ends, node, GEODESICS if node[k, lay.W_FRESH] >= 0.0 else UNKNOWN)
         if good and _on_branch(k, node, branch, before):
             node[k, S_SWEEP] = swept(k, node) if winds else 0.0
             return inside
@@ -131,7 +134,7 @@ def wrap_searched(k, ends, node, search):
     if low >= -DEPTH * node[k, SIZE] and not hooked:
         if hinted and node[k, KIND] >= lay.TORUS and node[k, KIND] != lay.CAPSULE:
             place(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
-            good, _ = _polish(k, ends, node)
+            good, _ = _polish(k, ends, node, UNKNOWN)
             if good:
                 node[k, S_SWEEP] = swept(k, node) if winds else 0.0
                 return inside
@@ -201,7 +204,7 @@ def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, br
             guessed = True
             for i in range(lay.STATE):
                 memory[lay.STATE + i] = node[k, S_MODE + i]
-        good, total = _polish(k, ends, node)
+        good, total = _polish(k, ends, node, UNKNOWN)
         if not good or not _on_branch(k, node, branch, before) or (found and total >= best * (1.0 - 1e-12)):
             continue
         found, best, fresh = True, total, j

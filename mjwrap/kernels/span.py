@@ -15,7 +15,7 @@ from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.geodesics import displace, geodesic
-from mjwrap.kernels.newton import ON_SURFACE, newton
+from mjwrap.kernels.newton import GEODESICS, ON_SURFACE, UNKNOWN, newton
 from mjwrap.kernels.relax import path_length, relax, search_rows, shorten
 from mjwrap.kernels.shape import into_frame, project
 from mjwrap.kernels.touch import drop, follow_branch, in_range, join, split, take_in
@@ -45,7 +45,10 @@ def _any(lo, hi, node, mode):
 
 @jit
 def _passes(lo, hi, node):
-    """Return how often a cold start wraps obstacle after obstacle: less often where a wrap is a search."""
+    """Return how often a cold start wraps obstacle after obstacle: once where a wrap is a search.
+
+    Newton's method on all of them takes as many steps from there as after a second pass, which costs more than one.
+    """
     if hi - lo == 1:
         return 1
     for k in range(lo, hi):
@@ -181,8 +184,8 @@ def _solve(lo, hi, ends, node, tol, direct):
         if cold and hi - lo == 1 and closed_form(node[lo, lay.KIND]):
             evaluations += shorten(lo, hi, ends, node, 1)
     _remember(lo, hi, node)
-    fresh = -1.0
-    if cold and hi - lo == 1 and not closed_form(node[lo, lay.KIND]):
+    fresh = GEODESICS if cold or (direct and hi - lo == 1) else UNKNOWN
+    if cold and hi - lo == 1 and node[lo, W_FRESH] >= 0.0 and not closed_form(node[lo, lay.KIND]):
         fresh = node[lo, W_FRESH]
     settled = False
     changes = 0
@@ -191,7 +194,7 @@ def _solve(lo, hi, ends, node, tol, direct):
         error = 0.0
         if _any(lo, hi, node, TOUCHED):
             error, i, e = newton(lo, hi, ends, node, tol, MAX_NEWTON, fresh)
-            fresh = -1.0
+            fresh = GEODESICS
             iterations += i
             evaluations += e
             good = error <= tol and follow_branch(lo, hi, node)
