@@ -120,7 +120,7 @@ def run_euler(code, params, signals, first, last, lengths, step, tension, counts
             counts[k, m] = -1 if status == fiber.NOT_CONVERGED else count
 
 
-def failures(motion: Motion, runner: Any, step: float) -> tuple[int, Array]:
+def failures(motion: Motion, runner: Any, step: float) -> tuple[int, NDArray[np.int64]]:
     """Return how many steps of a motion failed, and all evaluations."""
     n = len(motion.params)
     tension, counts = np.zeros((STEPS, n)), np.zeros((STEPS, n), np.int64)

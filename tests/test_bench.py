@@ -1,13 +1,16 @@
-"""The timing benchmarks as scripts: arguments, and a run of the one that times steps."""
+"""The timing benchmarks as scripts: arguments, and runs of those that time steps and muscles."""
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
@@ -26,6 +29,9 @@ ENVIRONMENT["PYTHONPATH"] = str(BENCHMARKS.parent)
         ("bench_paths.py", ["--json", "no/such/x.json"], "there is no folder"),
         ("bench_step.py", ["--repeats", "0"], "--repeats must be at least 1"),
         ("bench_step.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("bench_muscle.py", ["--repeats", "0"], "--repeats must be at least 1"),
+        ("bench_muscle.py", ["--step", "nan"], "--step must be above 0"),
+        ("bench_muscle.py", ["--json", "no/such/x.json"], "there is no folder"),
         ("energy.py", ["--seconds", "nan"], "--seconds must be between"),
     ],
 )
@@ -64,3 +70,49 @@ def test_the_step_benchmark_runs_and_adds_up(tmp_path: Path) -> None:
         assert row["ratio"] > 0
         assert row["kernel_calls"] > 1
         assert row["kernels"] > 0
+
+
+def test_the_muscle_benchmark_counts_what_it_times(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its short run of every row, which may miss a target on a busy machine, but not fail."""
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    bench = importlib.import_module("bench_muscle")
+    file = tmp_path / "muscle.json"
+    monkeypatch.setattr(bench, "STEPS", 100)
+    monkeypatch.setattr(
+        sys, "argv", ["bench_muscle.py", "--repeats", "1", "--step", "0.005", "--json", str(file)]
+    )
+    assert bench.main() in (0, 1)
+    rows = json.loads(file.read_text(encoding="utf-8"))
+    assert list(rows) == [label for label, _, _, _ in bench.CASES]
+    printed = capsys.readouterr().out
+    for label, row in rows.items():
+        assert label in printed
+        assert row["failures"] == 0
+        assert 0.0 < row["least"] <= row["median"] <= row["p95"]
+        if "evaluations" in row:
+            assert sum(row["evaluations"].values()) == row["steps"] == 1600
+    label = "millard_2012, elastic"
+    assert bench.verdict(label, rows[label] | {"failures": 1, "median": 0.0}) == "FAILED"
+    assert "MISSED" in bench.verdict(label, rows[label] | {"median": 0.51})
+
+
+def test_a_step_that_does_not_balance_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    bench = importlib.import_module("bench_muscle")
+    monkeypatch.setattr(bench, "STEPS", 4)
+    motion = bench.prepare("millard_2012", "elastic", 2e-3)
+    n = len(motion.params)
+
+    def wrong(*arguments: Any) -> None:
+        first, lengths, tension, counts = (arguments[i] for i in (3, 5, 7, 8))
+        bench.run_elastic(*arguments)
+        if first == 1:
+            tension[first, 0] += 2e-8 * motion.params[0, 0]
+            tension[first, 1] = np.nan
+            counts[first, 2], counts[first, 3] = 11, -1
+        assert len(lengths) == n
+
+    assert bench.failures(motion, wrong, 2e-3)[0] == 4
+    assert bench.failures(motion, bench.run_elastic, 2e-3)[0] == 0

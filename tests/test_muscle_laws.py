@@ -11,7 +11,7 @@ from hill_tables import LAWS, row
 from mjcf_reading import Vector
 
 from mjwrap.kernels import activation as dynamics
-from mjwrap.kernels import balance, degroote_fregly, fiber, millard
+from mjwrap.kernels import balance, bezier, degroote_fregly, fiber, millard
 
 # F_max [N], l_o [m], l_s [m], pennation [rad], v_max [l_o/s], damping
 MUSCLES = {
@@ -240,6 +240,34 @@ def test_slopes_of_curves(law: str, curve: str) -> None:
     telling = coarse > 1e-9
     assert telling.sum() > 50
     assert np.median(coarse[telling] / fine[telling]) == pytest.approx(4.0, rel=0.02)
+
+
+@pytest.mark.parametrize("curve", ["ACTIVE", "VELOCITY", "PASSIVE", "TENDON"])
+def test_tables_of_bezier_curves(curve: str) -> None:
+    """The polynomials against x(u) inverted by bisection, also where two of them meet; the straight lines outside."""
+    corners, pieces, cells = (getattr(millard, f"_{curve}{part}") for part in ("", "_PIECES", "_CELLS"))
+    ends = pieces[1:-1, bezier.MIDDLE, None] + np.array([-1.0, 1.0]) / pieces[1:-1, bezier.SCALE, None]
+    assert ends[1:, 0] == pytest.approx(ends[:-1, 1], rel=0, abs=4e-16 * np.abs(ends).max())
+    low, high = ends[0, 0], ends[-1, 1]
+    tips = ends.ravel()[1:-1]
+    at = np.concatenate([np.random.default_rng(12).uniform(low, high, 500), tips, np.nextafter(tips, low)])
+    for x in map(float, at):
+        corner = corners[max(np.searchsorted(corners[:, bezier.X0], x, side="right") - 1, 0)]
+        below, above = 0.0, 1.0
+        for _ in range(60):
+            u = 0.5 * (below + above)
+            part = bezier.blend(corner[bezier.XQ], corner[bezier.XR], u)[0]
+            below, above = (u, above) if corner[bezier.X0] + corner[bezier.DX] * part < x else (below, u)
+        y, up = bezier.blend(corner[bezier.YQ], corner[bezier.YR], u)
+        across = bezier.blend(corner[bezier.XQ], corner[bezier.XR], u)[1]
+        slope = corner[bezier.DY] * up / (corner[bezier.DX] * across)
+        found = bezier.evaluate(pieces, cells, x)
+        assert found[0] == pytest.approx(corner[bezier.Y0] + corner[bezier.DY] * y, rel=0, abs=1e-12)
+        assert found[1] == pytest.approx(slope, rel=1e-9, abs=1e-12)
+    for x, end in ((low, low - 0.3), (high, high + 0.3)):
+        there, beyond = bezier.evaluate(pieces, cells, x), bezier.evaluate(pieces, cells, end)
+        assert beyond[0] == pytest.approx(there[0] + there[1] * (end - x), abs=1e-13)
+        assert beyond[1] == pytest.approx(there[1], abs=1e-13)
 
 
 @EACH

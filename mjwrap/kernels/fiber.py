@@ -20,24 +20,19 @@ from mjwrap.kernels.balance import (
     NOT_CONVERGED,  # noqa: F401 - for whoever reads a status
     SLACK_TENDON,
     balance,
-    balanced_forces,
     balancing_velocity,
-    forces,
     length_curves,
     rest_imbalance,
     tendon_curve,
     velocity_curve,
 )
+from mjwrap.kernels.third_order import advance_third_order
 
 # Columns of params: F_max [N], l_o [m], l_s [m], pennation at l_o [rad], v_max [l_o/s], fibre damping [F_max per v_max
 # l_o], 1 where the tendon is elastic, fibre height [m], shortest fibre length [m].
 F_MAX, OPTIMAL, SLACK, PENNATION, V_MAX, DAMPING, ELASTIC, HEIGHT, LEAST = range(9)
 
-SURE = 3e-2  # [F_max] imbalance of a prediction up to which its slopes are good enough for the scheme
-LOOSE = 1e-2  # [F_max] imbalance from which one more Newton step makes such a step good enough
-WILD = 0.4  # [v_max l_o] change of velocity within a step beyond which the step is backward Euler's
-GUESS = 1e-4  # last Newton step for the velocity at the beginning of a step
-EXACT = 1e-8  # the same for `fiber_rate`
+EXACT = 1e-8  # last Newton step of `fiber_rate` for a velocity [v_max]: the error left is its square
 SPACING = 0.02  # [l_o] between looks for the first equilibrium
 FAR = 2.0  # [l_o] beyond which passive force alone grows: there is one equilibrium at most
 
@@ -131,98 +126,22 @@ def step_fiber(
     """Return what `advance_fiber` does, after a step of third order.
 
     activation, its rate [1/s], length [m] and speed [m/s], of the unit's lengthening, are those at the end of the step,
-    the others those at its beginning. The fibre's velocity v there and its rate w satisfy
-    l − 2/3 d v + d² w / 6 = fiber + 1/3 d v_before, with d the duration, v_before the velocity that balances at the
-    beginning, and w = λ v + φ from the balance's derivative by time, λ and φ from a prediction. A mode λ is multiplied
-    by (1 + z/3) / (1 − 2z/3 + z²/6), z = λ d: L-stable, as Radau's method of third order. Where the velocity changes
-    by more than WILD within the step, it is one of backward Euler: that passes no equilibrium.
+    the others those at its beginning. Method: `third_order.py`.
     """
     if params[m, ELASTIC] == 0.0 or duration <= 0.0:
         return _at_once(law, params, m, activation, length, fiber, duration)
-    optimal, slack, fastest, damping = (
-        params[m, OPTIMAL],
-        params[m, SLACK],
-        params[m, V_MAX],
-        params[m, DAMPING],
-    )
+    optimal, slack, damping = params[m, OPTIMAL], params[m, SLACK], params[m, DAMPING]
     height, least = params[m, HEIGHT] / optimal, params[m, LEAST] / optimal
-    ratio, reach, rise = optimal / slack, length / slack, (length - length_before) / slack
+    start = max(fiber / optimal, least)
     activation_before = min(max(activation_before, 0.0), 1.0)
     activation = min(max(activation, 0.0), 1.0)
-    start = max(fiber / optimal, least)
-    high = max(_taut(params, m, length), start)
-    span, turn = duration * fastest, duration * activation_rate
-    lead = duration * speed / slack
-    v_before, now = balanced_forces(
-        law, activation_before, damping, height, ratio, reach - rise, start, least, GUESS
+    unit = (law, activation, damping, height, optimal / slack, length / slack)
+    gains = (activation - activation_before, (length - length_before) / slack)
+    pace = (duration * activation_rate, duration * speed / slack)
+    x, pull, count, status = advance_third_order(
+        unit, gains, pace, start, least, max(_taut(params, m, length), start), duration * params[m, V_MAX]
     )
-    # a prediction, from the slopes at the beginning
-    x, v, count, known = start, v_before, 0, False
-    before = reduced = 0.0
-    if now[6] > 0.0:
-        bend, reduced, before = _third_order(span, lead, turn, start, v_before, now)
-        change = (
-            bend * (before - start) + (now[4] * rise - now[5] * (activation - activation_before)) / now[6]
-        )
-        v = (v_before + change) / max(1.0 - bend * reduced, 0.1)
-        x = before + reduced * v
-        # Newton's steps, each with the scheme of where it stands, while they make good way
-        left = math.inf
-        while not known and abs(v - v_before) <= WILD and least < x < high:
-            now = forces(law, activation, damping, height, ratio, reach, x, v)
-            count += 1
-            off = abs(now[0] - now[2])
-            if not (off <= 0.25 * left and now[6] > 0.0):
-                break
-            left = off
-            x, v, before, reduced = _corrected(span, lead, turn, start, v_before, now, x, v)
-            known = off <= SURE and abs(v - v_before) <= WILD and least < x < high
-    if not known:
-        rate = 1.0 / span
-        x, pull, more, status = balance(
-            law, activation, damping, height, ratio, reach, start, rate, least, high, start, LOOSE
-        )
-        count += more + 1
-        v = (x - start) * rate
-        now = forces(law, activation, damping, height, ratio, reach, x, v)
-        calm = status != AT_MINIMUM and now[6] > 0.0 and abs(v - v_before) <= WILD
-        euler = x
-        if calm:
-            x, v, before, reduced = _corrected(span, lead, turn, start, v_before, now, x, v)
-            calm = abs(v - v_before) <= WILD and least < x < high
-        if not calm:
-            x, pull, more, status = balance(
-                law, activation, damping, height, ratio, reach, start, rate, least, high, euler, CLOSE
-            )
-            return x * optimal, pull * params[m, F_MAX], count + more, status
-    high = max(high, before)
-    x = min(max(x, least), high)
-    x, pull, more, status = balance(
-        law, activation, damping, height, ratio, reach, before, 1.0 / reduced, least, high, x, CLOSE
-    )
-    return x * optimal, pull * params[m, F_MAX], count + more, status
-
-
-@jit
-def _third_order(span, lead, turn, start, v_before, now):
-    """Return slope λ of v by x, and r and x_0 of the scheme x = x_0 + r v, by the slopes that `forces` has returned.
-
-    span: duration x v_max; lead: what the unit lengthens by in a step at its speed [l_s]; turn: the same of activation.
-    """
-    _, d_pull, _, d_force, stiffness, strength, drag = now
-    bend = (d_pull - d_force) / drag
-    reduced = span * (2.0 / 3.0 - min(span * bend, 1.0) / 6.0)
-    forcing = (stiffness * lead - strength * turn) / drag
-    return bend, reduced, start + span * (v_before / 3.0 - forcing / 6.0)
-
-
-@jit
-def _corrected(span, lead, turn, start, v_before, now, x, v):
-    """Return x and v after a Newton step from a balance's `forces` at x and v, and x_0 and r of the scheme by them."""
-    bend, reduced, before = _third_order(span, lead, turn, start, v_before, now)
-    slope = min(bend - 1.0 / reduced, -0.1 / reduced)
-    x -= ((now[0] - now[2]) / now[6] + v - (x - before) / reduced) / slope
-    return x, (x - before) / reduced, before, reduced
+    return x * optimal, pull * params[m, F_MAX], count, status
 
 
 @jit
