@@ -14,7 +14,6 @@ the corner's steepest slope; `evaluate` reads value and slope from its integral.
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mjwrap.kernels._jit import jit
@@ -68,7 +67,7 @@ def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
     start, end = _straight(curve[0], 0.0), _straight(curve[-1], 1.0)
     width = end[MIDDLE] - start[MIDDLE]
     start[SCALE] = CELLS / width
-    inner = np.vstack([_pieces(corner) for corner in curve])
+    inner = _pieces(curve)
     ends = np.concatenate([inner[1:, MIDDLE] - 1.0 / inner[1:, SCALE], end[None, MIDDLE]])
     edges = start[MIDDLE] + width / CELLS * np.arange(CELLS)
     if np.diff(ends).min() * start[SCALE] < 1.0:
@@ -86,40 +85,44 @@ def _straight(corner: Array, u: float) -> Array:
     return piece
 
 
-def _pieces(corner: Array) -> Array:
-    """Return the pieces of a corner, from left to right, halved until each is close enough."""
+def _pieces(curve: Array) -> Array:
+    """Return the pieces of all corners, from left to right, halved until each is close enough."""
     nodes = np.cos(np.arange(DEGREE) * np.pi / (DEGREE - 1))  # with the ends, so that pieces meet there
     tests = np.linspace(-1.0, 1.0, 11)
-    fit = np.linalg.inv(chebyshev.chebvander(nodes, DEGREE - 1))
-    power = np.array([np.pad(chebyshev.cheb2poly(row), (0, DEGREE))[:DEGREE] for row in np.eye(DEGREE)])
-    middle, half = np.array([0.5]), 0.5  # of the corner's width
-    done: list[Array] = []
-    steepest = np.abs(_curve(corner, np.linspace(0.0, 1.0, 65))[1]).max()
-    while middle.size:
-        value = _curve(corner, middle)[0]
-        _, slope = _curve(corner, (middle[:, None] + half * nodes).ravel())
-        coefficients = slope.reshape(-1, DEGREE) @ fit.T @ power  # (n, DEGREE) of the slope
-        _, there = _curve(corner, (middle[:, None] + half * tests).ravel())
-        there = there.reshape(-1, tests.size)
-        off = np.abs(coefficients @ np.vander(tests, DEGREE, increasing=True).T - there)
-        good = (off <= SAME * np.abs(there) + STEEPEST * steepest).all(axis=1) | (half <= NARROWEST)
-        width = half * corner[DX]
-        for k in np.flatnonzero(good):
-            x = corner[X0] + middle[k] * corner[DX]
-            rising = coefficients[k] * width / np.arange(1, DEGREE + 1)
-            done.append(np.concatenate([[x, 1.0 / width, value[k]], rising]))
+    spots = np.concatenate([[0.0], nodes, tests])
+    fit = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    powers = np.vander(tests, DEGREE, increasing=True).T
+    _, slope = _curve(curve[:, None], np.broadcast_to(np.linspace(0.0, 1.0, 65), (len(curve), 65)))
+    steepest = np.abs(slope).max(axis=1)
+    which, middle, half = np.arange(len(curve)), np.full(len(curve), 0.5), 0.5  # in widths of the corner
+    done = []
+    while which.size:
+        value, slope = _curve(curve[which, None], middle[:, None] + half * spots)
+        there = slope[:, 1 + DEGREE :]
+        rising = slope[:, 1 : 1 + DEGREE] @ fit  # coefficients of the slope
+        off = np.abs(rising @ powers - there) - SAME * np.abs(there)
+        good = (off <= STEEPEST * steepest[which, None]).all(axis=1) | (half <= NARROWEST)
+        width = half * curve[which, DX]
+        rising *= width[:, None] / np.arange(1, DEGREE + 1)
+        x = curve[which, X0] + middle * curve[which, DX]
+        done.append(np.column_stack([x, 1.0 / width, value[:, 0], rising])[good])
         half *= 0.5
-        middle = np.concatenate([middle[~good] - half, middle[~good] + half])
-    done.sort(key=lambda piece: float(piece[MIDDLE]))
-    return np.array(done)
+        which = np.repeat(which[~good], 2)
+        middle = (middle[~good, None] + half * np.array([-1.0, 1.0])).ravel()
+    found = np.concatenate(done)
+    return found[np.argsort(found[:, MIDDLE])]
 
 
 def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
-    """Return y and dy/dx at parts (n,) of a corner's width: x(u) inverted by Newton's steps, kept in a bracket."""
+    """Return y and dy/dx at parts (n, k) of the widths of corners (n, 1, 10).
+
+    x(u) is inverted by Newton's steps, kept in a bracket.
+    """
+    _, dx, xq, xr, y0, dy, yq, yr, _, _ = np.moveaxis(corner, -1, 0)
     part = np.clip(part, 0.0, 1.0)
     low, high, u = np.zeros_like(part), np.ones_like(part), part
     for _ in range(MOST):
-        value, slope = _blend(corner[XQ], corner[XR], u)
+        value, slope = _blend(xq, xr, u)
         low, high = np.where(value < part, u, low), np.where(value < part, high, u)
         new = u + (part - value) / slope
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
@@ -127,8 +130,8 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
         u = new
         if last:
             break
-    y, up = _blend(corner[YQ], corner[YR], u)
-    return corner[Y0] + corner[DY] * y, corner[DY] * up / (corner[DX] * _blend(corner[XQ], corner[XR], u)[1])
+    y, up = _blend(yq, yr, u)
+    return y0 + dy * y, dy * up / (dx * _blend(xq, xr, u)[1])
 
 
 @jit
