@@ -96,7 +96,7 @@ def _poses(count, pos, quat, node, before):
             for i in range(3):
                 node[k, layout.POS + i] = pos[0, k, i]
             chain.set_rotation(node, k, quat[0, k, 0], quat[0, k, 1], quat[0, k, 2], quat[0, k, 3])
-        chain._extrapolate(node, before)
+        chain.extrapolate(node, before)
 
 
 @njit

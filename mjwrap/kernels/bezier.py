@@ -46,7 +46,7 @@ def corners(ends: list[Corner], curviness: list[float]) -> Array:
     return np.array(rows)
 
 
-def _blend(q, r, u):
+def blend(q, r, u):
     """Return a coordinate of a corner at u in [0, 1], counted from one end in units of both ends, and its slope."""
     v = 1.0 - u
     uu, vv = u * u, v * v
@@ -55,7 +55,7 @@ def _blend(q, r, u):
     return q * b + r * e + uu * uu * u, q * d + r * f + 5.0 * uu * uu
 
 
-blend = jit(_blend)
+blend = jit(blend)
 
 
 def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
@@ -122,7 +122,7 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
     part = np.clip(part, 0.0, 1.0)
     low, high, u = np.zeros_like(part), np.ones_like(part), part
     for _ in range(MOST):
-        value, slope = _blend(xq, xr, u)
+        value, slope = blend(xq, xr, u)
         low, high = np.where(value < part, u, low), np.where(value < part, high, u)
         new = u + (part - value) / slope
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
@@ -130,8 +130,8 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
         u = new
         if last:
             break
-    y, up = _blend(yq, yr, u)
-    return y0 + dy * y, dy * up / (dx * _blend(xq, xr, u)[1])
+    y, up = blend(yq, yr, u)
+    return y0 + dy * y, dy * up / (dx * blend(xq, xr, u)[1])
 
 
 @jit

@@ -113,7 +113,7 @@ def set_rotation(node, k, w, x, y, z):
 
 
 @jit
-def _extrapolate(node, before):
+def extrapolate(node, before):
     """Start from the straight continuation of the last two poses where both touch; keep the last in `before`."""
     for k in range(node.shape[0]):
         both = node[k, S_MODE] == lay.TOUCHED and before[k, 0] == lay.TOUCHED
@@ -147,7 +147,7 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
             if not warm:
                 node[k, S_MODE] = lay.COLD
         if warm:
-            _extrapolate(node, before)
+            extrapolate(node, before)
         x, y, z = origin[j, 0], origin[j, 1], origin[j, 2]
         solve_chain(
             0, n, x, y, z, insertion[j, 0], insertion[j, 1], insertion[j, 2], node, tol, False, info, j
