@@ -290,3 +290,30 @@ def test_a_law_without_a_tendon_takes_none() -> None:
     custom = declared([*ACTUATOR, *ROW], {"optimal_force": 5.0}, texts={"tendon_model": "rigid"})
     with pytest.raises(mw.ModelError, match="law 'path_actuator' has no tendon"):
         mw.MuscleSystem(compiled(custom=custom))
+
+
+def test_energetics_of_a_simulation() -> None:
+    """Powers balance at every state, and the tension times speed is what reaches the skeleton."""
+    model = elastic()
+    muscles, data = mw.MuscleSystem(model), start(model)
+    for _ in range(20):
+        muscles.step(data, nstep=5)
+        muscles.forward(data)
+        found = muscles.energetics(mw.Umberger2010())
+        assert found.muscle_power == pytest.approx(-muscles.tension * muscles.velocity, rel=1e-12, abs=1e-12)
+        assert found.muscle_power == pytest.approx(
+            found.fiber_power + found.tendon_power, rel=1e-7, abs=1e-7 * abs(found.fiber_power[0])
+        )
+        assert found.metabolic_power[0] > 0.0
+    assert muscles.energetics().metabolic_power[0] == 0.0
+
+
+def test_the_excitation_of_a_native_muscle_reaches_its_metabolism() -> None:
+    model = compiled(custom=declared([*ACTUATOR, *ROW], HILL))
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    heats = []
+    for control in (0.1, 0.9):
+        data.act[0], data.ctrl[0] = 0.3, control
+        muscles.forward(data)
+        heats.append(muscles.energetics(mw.Umberger2010()).activation_heat[0])
+    assert heats[1] > 1.2 * heats[0]
