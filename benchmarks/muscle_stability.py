@@ -48,6 +48,7 @@ class Row:
     not_finite: int = 0
     not_converged: int = 0
     evaluations: int = 0
+    above: int = 0  # steps of more than MOST evaluations
     extra: int = 0
     zigzags: int = 0
     noisy: int = 0  # muscles with extra zigzags
@@ -121,6 +122,7 @@ def alone(name: str, model: mujoco.MjModel, law: str, seconds: float, seed: int)
             row.not_finite += int((~np.isfinite(run.tension)).sum())
             row.not_converged += int((run.status == 3).sum())
             row.evaluations = max(row.evaluations, int(run.iterations[1:].max()))
+            row.above += int((run.iterations[1:] > MOST).sum())
             here, there = zigzags(run.tension / strong), zigzags(reference.tension[::stride] / strong)
             row.zigzags += there
             if here > there:
@@ -182,7 +184,7 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     rows: list[Row] = []
     print(
-        "model   law                    step  muscles  not finite  not conv.  evaluations  zigzags  extra  off [F_max]"
+        "model   law                    step  muscles  not finite  not conv.  evaluations  above 10  zigzags  extra  off [F_max]"
     )
     for name in args.models:
         model = myo_sim_spec(name).compile()
@@ -191,7 +193,7 @@ def main(arguments: list[str] | None = None) -> int:
                 rows.append(row)
                 print(
                     f"{row.model:11} {row.law:21} {1e3 * row.timestep:3.0f} ms  {row.muscles:7}  {row.not_finite:10}  "
-                    f"{row.not_converged:9}  {row.evaluations:11}  {row.zigzags:7}  {row.extra:5}  {row.off:.3f}",
+                    f"{row.not_converged:9}  {row.evaluations:11}  {row.above:8}  {row.zigzags:7}  {row.extra:5}  {row.off:.3f}",
                     flush=True,
                 )
     held = True
