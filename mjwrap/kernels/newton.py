@@ -25,6 +25,7 @@ TOUCHED = lay.TOUCHED
 ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
 LAST = 2e-9  # the same at the path's last point, where nothing pins the contact
 PINNED = 1e-11  # a contact nearer than this share of the size to an end on the surface is at it
+CORNER = 1e-6  # half the angle between two contacts that meet, beyond which they do not go on into each other [rad]
 NOISE = 4e-16  # rounding of a point [m]: over a segment's length it bounds what its direction can say
 MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in radii
@@ -128,7 +129,10 @@ def _connect(lo, hi, ends, node):
         node[k, W_CP] = along
         node[k, W_CP + 1] = normal
         node[k, W_CP + 2] = binormal
-        total += _share(along, normal, binormal, size)
+        corner = (
+            short and last >= 0 and (1.0 - along) ** 2 + normal * normal + binormal * binormal > CORNER**2
+        )
+        total += _share(along, normal, binormal, 1.0 if corner else size)
         if last >= 0:
             total += _leave(last, dx, dy, dz, size, False, node)
         x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
@@ -322,6 +326,8 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=UNKNOWN):
     if square < 0.0:
         square = _connect(lo, hi, ends, node) if square == GEODESICS else evaluate(lo, hi, ends, node)
         evaluations = 1
+    if node[lo, lay.W_FIRST] < 0.0:
+        node[lo, lay.W_FIRST] = square
     iterations = 0
     if _pin(lo, hi, ends, node):
         square = evaluate(lo, hi, ends, node)
