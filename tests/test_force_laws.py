@@ -38,22 +38,14 @@ PULLEY = """<mujoco><option gravity="0 0 0"/><worldbody>
 
 
 class Scene:
-    """A model at one state, with its muscles on the branch that a jump from rest leads to, or started afresh there."""
+    """A model at one state, with its muscles on the branch that a jump from rest leads to."""
 
-    def __init__(
-        self,
-        label: str,
-        model: mujoco.MjModel,
-        disturb: Callable[[mujoco.MjData], None],
-        afresh: bool = False,
-    ) -> None:
+    def __init__(self, label: str, model: mujoco.MjModel, disturb: Callable[[mujoco.MjData], None]) -> None:
         self.label, self.model = label, model
         self.data, self.muscles = mujoco.MjData(model), mw.MuscleSystem(model)
         self.muscles.excitation[:] = np.linspace(0.3, 1.0, self.muscles.n)
         self.muscles.forward(self.data)
         disturb(self.data)
-        if afresh:
-            self.muscles.reset(self.data)
         self.muscles.forward(self.data)
         assert not self.muscles.status.any(), f"{label}: {self.muscles.report()}"
         mujoco.mj_forward(model, self.data)
@@ -117,10 +109,7 @@ def random_scenes(surfaces: tuple[str, ...]) -> Iterator[Scene]:
         model = random_model(seed, surfaces)
         rng = np.random.default_rng(1000 + seed)
         for k in range(PER_SEED):
-            afresh = surfaces is ALL  # a jump may ask for a branch that no longer exists there
-            yield Scene(
-                f"random {seed}.{k}", model, lambda data, m=model, r=rng: random_state(m, data, r), afresh
-            )
+            yield Scene(f"random {seed}.{k}", model, lambda data, m=model, r=rng: random_state(m, data, r))
 
 
 def scenes() -> Iterator[Scene]:

@@ -42,18 +42,19 @@ def landing(rng: np.random.Generator, letter: str) -> tuple[Array, Array, Array,
 NEAR_A_TORUS = (
     "a known limit (docs/limits.md): beside a torus that the path leaves at once the search can fail"
 )
-SHAPES_TO_LAND_ON = [
+LANDINGS = [
     pytest.param(
         letter,
-        id=NAMES[letter],
-        marks=[pytest.mark.xfail(strict=True, reason=NEAR_A_TORUS)] * (letter == "t"),
+        warm,
+        id=f"{NAMES[letter]}-{'warm' if warm else 'cold'}",
+        marks=[pytest.mark.xfail(strict=True, reason=NEAR_A_TORUS)] * (letter == "t" and not warm),
     )
     for letter in LETTERS
+    for warm in (False, True)
 ]
 
 
-@both_starts
-@pytest.mark.parametrize("letter", SHAPES_TO_LAND_ON)
+@pytest.mark.parametrize(("letter", "warm"), LANDINGS)
 def test_an_end_point_that_comes_to_lie_on_a_surface_has_a_path(letter: str, warm: bool) -> None:
     """Lengths change by no more than the end moves: the shortest path, and one that stays on its branch, do so.
 

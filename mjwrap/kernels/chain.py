@@ -10,9 +10,9 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import minimal
 from mjwrap.kernels.geodesics import displace
+from mjwrap.kernels.jumps import solve_span
 from mjwrap.kernels.newton import evaluate
 from mjwrap.kernels.relax import path_length
-from mjwrap.kernels.span import solve_span
 
 KIND, POS, ROT = lay.KIND, lay.POS, lay.ROT
 S_MODE, S_ARC = lay.S_MODE, lay.S_ARC
@@ -130,6 +130,23 @@ def extrapolate(node, before):
 
 
 @jit
+def _repaired(node):
+    """Return whether a span of the last solve needed another start than the one that it was given."""
+    for k in range(node.shape[0]):
+        if node[k, KIND] != lay.VIA and node[k, lay.W_REPAIRS] > 0.0:
+            return True
+    return False
+
+
+@jit
+def _go_back(node, before):
+    """Go back to the solution of the pose before."""
+    for k in range(node.shape[0]):
+        for i in range(lay.STATE):
+            node[k, S_MODE + i] = before[k, i]
+
+
+@jit
 def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
     """Solve every pose of a motion: origin, insertion (T, 3), pos (T, n, 3), quat (T, n, 4); results in info (T, INFO).
 
@@ -149,14 +166,15 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
         if warm:
             extrapolate(node, before)
         x, y, z = origin[j, 0], origin[j, 1], origin[j, 2]
-        solve_chain(
-            0, n, x, y, z, insertion[j, 0], insertion[j, 1], insertion[j, 2], node, tol, False, info, j
-        )
+        u, v, w = insertion[j, 0], insertion[j, 1], insertion[j, 2]
+        solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
+        if warm and j > 0 and _repaired(node):  # the straight continuation led astray
+            _go_back(node, before)
+            solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
         if warm and info[j, I_STATUS] != lay.CONVERGED:
+            _go_back(node, before)
             for k in range(
                 n
             ):  # go on from the last pose that was solved, or cold from where an end was inside
-                for i in range(lay.STATE):
-                    node[k, S_MODE + i] = before[k, i]
                 if info[j, I_STATUS] == lay.ENDPOINT_INSIDE:
                     node[k, S_MODE] = lay.COLD

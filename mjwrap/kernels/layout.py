@@ -10,7 +10,7 @@ references on every array that it hands on. A row holds, in this order:
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
     HINT  (4)   flag (0 or 1), then the hint in S [m]
-    S_... (9)   the saved solution: what a warm start needs, nothing else
+    S_... (11)  the saved solution: what a warm start needs, nothing else
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
 """
 
@@ -45,47 +45,54 @@ NO_GEODESIC = 7
 # ------------------------------------------------------------------------ columns of the saved solution
 S_MODE = 22  # COLD, FREE or TOUCHED
 S_SWEEP = 23  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
-S_P = 24  # first contact point P in S (3) [m]
-S_T = 27  # unit tangent at P in S (3)
+S_P = 24  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts, see `jumps.py`
+S_T = 27  # unit tangent at P in S (3); FREE, no closed form: where the straight segment ends [m]; zeros: not known
 S_ARC = 30  # arc length s [m]
-STATE = 9  # how many they are
+S_BEFORE = (
+    31  # lengths of the straight segments that meet P and leave Q, where the path was found last (2) [m]
+)
+STATE = 11  # how many they are
 
 COLD = -1.0
 FREE = 0.0
 TOUCHED = 1.0
 
 # -------------------------------------------------------------------- columns of results and scratch
-W_P = 31  # P (3), then Q, t_P, t_Q, n_P, n_Q, b_P, b_Q (3 each)
-W_Q = 34
-W_TP = 37
-W_TQ = 40
-W_NP = 43
-W_NQ = 46
-W_BP = 49
-W_BQ = 52
-W_KP = 55  # kappa, tau, beta at P
-W_KQ = 58  # kappa, tau, beta at Q
-W_JAC = 61  # Jacobi fields a, a', r, r' at Q
-W_E = 65  # unit vector of the straight segment that arrives at P (3)
-W_L = 68  # its length [m]
-W_CP = 69  # e.t, e.n, e.b at P (3)
-W_CQ = 72  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves
-W_LQ = 75  # length of the segment that leaves [m]
-W_EQ = 76  # its unit vector (3)
-W_Y = 79  # block elimination: solution for the right-hand side (4)
-W_X = 83  # block elimination: solution for the upper coupling (4 x 2)
-W_SAVE = 91  # P, t, s before a trial step (7)
-W_OLD = 98  # the saved solution from which the solve started (9)
-W_KMIN = 107  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
-W_RMIN = 108  # smallest of r over the arc so far: <= 0 behind a conjugate point
-W_ANGLE = 109  # about the axis from P to Q [rad]; torus: how often the hole is passed; CUSTOM: 1 out of range, else 0
-TWIN = 110  # 1 in the second row of a surface that a string may touch twice, 0 else
-W_LAST = 111  # the saved solution before a single wrap (9)
+W_P = 33  # P (3), then Q, t_P, t_Q, n_P, n_Q, b_P, b_Q (3 each)
+W_Q = 36
+W_TP = 39
+W_TQ = 42
+W_NP = 45
+W_NQ = 48
+W_BP = 51
+W_BQ = 54
+W_KP = 57  # kappa, tau, beta at P
+W_KQ = 60  # kappa, tau, beta at Q
+W_JAC = 63  # Jacobi fields a, a', r, r' at Q
+W_E = 67  # unit vector of the straight segment that arrives at P (3)
+W_L = 70  # its length [m]
+W_CP = 71  # e.t, e.n, e.b at P (3)
+W_CQ = 74  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves
+W_LQ = 77  # length of the segment that leaves [m]
+W_EQ = 78  # its unit vector (3)
+W_Y = 81  # block elimination: solution for the right-hand side (4)
+W_X = 85  # block elimination: solution for the upper coupling (4 x 2)
+W_SAVE = 93  # P, t, s before a trial step (7)
+W_OLD = 100  # the saved solution from which the solve started (11)
+W_KMIN = 111  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
+W_RMIN = 112  # smallest of r over the arc so far: <= 0 behind a conjugate point
+W_ANGLE = 113  # about the axis from P to Q [rad]; torus: how often the hole is passed; CUSTOM: 1 out of range, else 0
+TWIN = 114  # 1 in the second row of a surface that a string may touch twice, 0 else
+W_LAST = 115  # the saved solution before a single wrap (11)
 W_FRESH = (
-    120  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
+    126  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
 )
-W_BEST = 121  # the shortest solution that several cold starts have found (9)
-ROW = 136  # 17 cache lines
+W_BEST = 127  # the shortest solution that several cold starts have found (11)
+W_START = 138  # the saved solution from which a solve over a large move started (11)
+W_LOW = 149  # height of the lowest point of a free string over the surface [m]
+W_FIRST = 150  # in a span's first row: ||f||^2 of the contacts from which it started; -1 where they are not evaluated
+W_REPAIRS = 151  # in a span's first row: how often the path was begun anew, from another start or in strides
+ROW = 152  # 19 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
 I_LENGTH = 0

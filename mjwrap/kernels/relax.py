@@ -114,7 +114,7 @@ def _other_way(first, last, node):
 
 
 @jit
-def _keep(lo, hi, node, out, back):
+def keep(lo, hi, node, out, back):
     """Copy the saved solutions of lo..hi to the columns `out`, or back from there."""
     for j in range(lo, hi):
         for i in range(lay.STATE):
@@ -125,7 +125,7 @@ def _keep(lo, hi, node, out, back):
 
 
 @jit
-def _between(lo, hi, first, last, ends, node):
+def between(lo, hi, first, last, ends, node):
     """Return the ends of the part first..last of the path over lo..hi, from the contacts on both sides of it."""
     ax, ay, az = ends[3], ends[4], ends[5]
     for j in range(first - 1, lo - 1, -1):
@@ -154,15 +154,15 @@ def shorten(lo, hi, ends, node, passes):
                 if not (whole or (run == 1 and _searchable(k, node))):
                     continue
                 first, last = max(lo, k - WINDOW), min(hi, k + run + WINDOW)
-                part = _between(lo, hi, first, last, ends, node)
+                part = between(lo, hi, first, last, ends, node)
                 before = path_length(first, last, part, node)
-                _keep(first, last, node, W_OLD, False)
+                keep(first, last, node, W_OLD, False)
                 _other_way(k, k + run, node)
                 spent += relax(first, last, part, node, passes, False)
                 if path_length(first, last, part, node) < before * (1.0 - 1e-9):
                     shorter = True
                     continue
-                _keep(first, last, node, W_OLD, True)
+                keep(first, last, node, W_OLD, True)
                 for j in range(first, last):
                     if node[j, S_MODE] == TOUCHED:
                         geodesic(j, node, ends[0], ends[1], ends[2])
@@ -191,9 +191,9 @@ def search_rows(lo, hi, ends, node, passes):
         total = path_length(lo, hi, ends, node)
         if total < best * (1.0 - 1e-9):
             best = total
-            _keep(lo, hi, node, lay.W_BEST, False)
+            keep(lo, hi, node, lay.W_BEST, False)
         else:
-            _keep(lo, hi, node, lay.W_BEST, True)
+            keep(lo, hi, node, lay.W_BEST, True)
             for j in range(lo, hi):
                 if node[j, S_MODE] == TOUCHED:
                     geodesic(j, node, ends[0], ends[1], ends[2])

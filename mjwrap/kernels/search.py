@@ -26,7 +26,7 @@ from mjwrap.kernels.stoermer import carray, stack
 KIND, DIM, SIZE, POS, ROT, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
 W_P, W_Q = lay.W_P, lay.W_Q
-COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
+COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 DIRECTIONS = 12  # half planes around AB
 LOCAL_TOL = 1e-5  # tangency error of a single wrap: all of them are polished together
@@ -82,27 +82,16 @@ def _on_branch(k, node, known, before):
 
 
 @jit
-def _caught(k, ends, node, mode, x, y, z, dx, dy, dz):
-    """Return whether a string that is free now hangs on the surface, because that was pulled through it since.
-
-    S_P and S_T hold the surface point next to a free string (x, y, z: its lowest point), and the normal there. Where
-    the normal has turned by more than a right angle the surface has changed sides: if a string can hold on the side
-    on which it was, it does. Long surfaces catch it, round ones slip through.
-    """
-    px, py, pz, nx, ny, nz = project(node, k, x, y, z)
-    if mode == FREE and nx * node[k, S_T] + ny * node[k, S_T + 1] + nz * node[k, S_T + 2] < 0.0:
-        place(k, node, node[k, S_P], node[k, S_P + 1], node[k, S_P + 2], dx, dy, dz, 0.0)
-        good, _ = _polish(k, ends, node, UNKNOWN)
-        if good:
-            node[k, S_SWEEP] = 0.0
-            return True
-    node[k, S_P] = px
-    node[k, S_P + 1] = py
-    node[k, S_P + 2] = pz
-    node[k, S_T] = nx
-    node[k, S_T + 1] = ny
-    node[k, S_T + 2] = nz
-    return False
+def _pass_by(k, node, sweep, low, ax, ay, az, bx, by, bz):
+    """Leave the surface untouched by the straight segment from A to B, and note where that runs."""
+    set_free(node, k, sweep)
+    node[k, lay.W_LOW] = low
+    node[k, S_P] = ax
+    node[k, S_P + 1] = ay
+    node[k, S_P + 2] = az
+    node[k, S_T] = bx
+    node[k, S_T + 1] = by
+    node[k, S_T + 2] = bz
 
 
 @jit
@@ -138,12 +127,7 @@ def wrap_searched(k, ends, node, search):
             if good:
                 node[k, S_SWEEP] = swept(k, node) if winds else 0.0
                 return inside
-        keeps = node[k, KIND] == lay.ELLIPSOID or node[k, KIND] == lay.CAPSULE
-        if keeps and _caught(
-            k, ends, node, mode, ax + share * dx, ay + share * dy, az + share * dz, dx, dy, dz
-        ):
-            return inside
-        set_free(node, k, straight)
+        _pass_by(k, node, straight, low, ax, ay, az, bx, by, bz)
         return inside
     if mode == TOUCHED and not search:
         for i in range(lay.STATE):

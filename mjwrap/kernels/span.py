@@ -35,7 +35,7 @@ CALM = 4  # changes of the set of touched obstacles, beyond one for each, that c
 
 
 @jit
-def _any(lo, hi, node, mode):
+def any_in(lo, hi, node, mode):
     """Return whether a node of lo..hi is in the given mode."""
     for k in range(lo, hi):
         if node[k, S_MODE] == mode:
@@ -74,7 +74,7 @@ def _remember(lo, hi, node):
 
 
 @jit
-def _restore(lo, hi, ends, node):
+def restore(lo, hi, ends, node):
     for k in range(lo, hi):
         for i in range(lay.STATE):
             node[k, S_MODE + i] = node[k, W_OLD + i]
@@ -116,7 +116,7 @@ def _slip_off(lo, hi, ends, node, sign):
 
 
 @jit
-def _outside(lo, hi, ends, node, column):
+def outside(lo, hi, ends, node, column):
     """Return whether an end of the span lies inside an obstacle, and the end moved onto that obstacle's surface."""
     x, y, z = ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
     for k in range(lo, hi):
@@ -135,7 +135,7 @@ def _outside(lo, hi, ends, node, column):
 @jit
 def _end_inside(lo, hi, ends, node):
     """Return whether an end of the span lies inside an obstacle."""
-    return _outside(lo, hi, ends, node, 3)[0] or _outside(lo, hi, ends, node, 6)[0]
+    return outside(lo, hi, ends, node, 3)[0] or outside(lo, hi, ends, node, 6)[0]
 
 
 @jit
@@ -151,39 +151,22 @@ def _ends_short(lo, hi, node):
 
 
 @apart
-def solve_span(lo, hi, ends, node, tol, direct):
-    """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
-
-    ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
-    leaves the new one in its place. With `direct` a single obstacle is wrapped in closed form whatever is saved but
-    its branch. Where an end lies inside a surface, the length is that of the path from the surface point next to it.
-    """
-    status, total, error, iterations, evaluations = _solve(lo, hi, ends, node, tol, direct)
-    if status == lay.ENDPOINT_INSIDE:
-        _, ax, ay, az = _outside(lo, hi, ends, node, 3)
-        _, bx, by, bz = _outside(lo, hi, ends, node, 6)
-        _restore(lo, hi, ends, node)
-        ends = (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
-        _, total, _, i, e = _solve(lo, hi, ends, node, tol, direct)
-        iterations += i
-        evaluations += e
-    return status, total, error, iterations, evaluations
-
-
-@jit
-def _solve(lo, hi, ends, node, tol, direct):
-    """Do what `solve_span` says for ends that lie outside of every surface."""
+def settle(lo, hi, ends, node, tol, direct):
+    """Find the path as `solve_span` says, from the saved solution alone, for ends that lie outside of every surface."""
     iterations, evaluations, repairs = 0, 0, 0
     error = 0.0
     status = lay.CONVERGED
-    cold = _any(lo, hi, node, COLD)
+    cold = any_in(lo, hi, node, COLD)
+    if not cold:
+        _remember(lo, hi, node)
     if cold and hi - lo > 1 and not _all_hinted(lo, hi, node):
         evaluations += search_rows(lo, hi, ends, node, COLD_PASSES)
     elif cold or (direct and hi - lo == 1):
         evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node), False)
         if cold and hi - lo == 1 and closed_form(node[lo, lay.KIND]):
             evaluations += shorten(lo, hi, ends, node, 1)
-    _remember(lo, hi, node)
+    if cold:
+        _remember(lo, hi, node)
     fresh = GEODESICS if cold or (direct and hi - lo == 1) else UNKNOWN
     if cold and hi - lo == 1 and node[lo, W_FRESH] >= 0.0 and not closed_form(node[lo, lay.KIND]):
         fresh = node[lo, W_FRESH]
@@ -192,7 +175,7 @@ def _solve(lo, hi, ends, node, tol, direct):
     for _ in range(MAX_ROUNDS):
         good = True
         error = 0.0
-        if _any(lo, hi, node, TOUCHED):
+        if any_in(lo, hi, node, TOUCHED):
             error, i, e = newton(lo, hi, ends, node, tol, MAX_NEWTON, fresh)
             fresh = GEODESICS
             iterations += i
@@ -216,7 +199,7 @@ def _solve(lo, hi, ends, node, tol, direct):
             break
         saddle = good and changes == 0
         if repairs == 0 and not saddle:
-            _restore(lo, hi, ends, node)
+            restore(lo, hi, ends, node)
         if repairs == AFRESH:
             _start_afresh(lo, hi, cold, node)
         elif saddle:
@@ -236,8 +219,12 @@ def _solve(lo, hi, ends, node, tol, direct):
         status = lay.ENDPOINT_INSIDE
     elif status == lay.CONVERGED and not in_range(lo, hi, ends, node):
         status = lay.OUT_OF_RANGE
+    node[lo, lay.W_REPAIRS] = repairs
     for k in range(lo, hi):
         node[k, HINT] = abs(node[k, HINT])
+        if settled and node[k, S_MODE] == TOUCHED:
+            node[k, lay.S_BEFORE] = node[k, lay.W_L]
+            node[k, lay.S_BEFORE + 1] = node[k, lay.W_LQ]
     total = path_length(lo, hi, ends, node)
     if not math.isfinite(error):
         status = lay.NOT_CONVERGED

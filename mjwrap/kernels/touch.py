@@ -51,18 +51,20 @@ def follow_branch(lo, hi, node):
 
 
 @jit
+def _release(k, node):
+    """Let go of a contact; where the straight segment beside the surface runs is not known yet."""
+    node[k, S_MODE] = FREE
+    for i in range(7):
+        node[k, S_P + i] = 0.0
+
+
+@jit
 def drop(lo, hi, node):
     """Release the obstacles whose arc is negative; return how many."""
     dropped = 0
     for k in range(lo, hi):
         if node[k, S_MODE] == TOUCHED and node[k, S_ARC] < 0.0:
-            node[k, S_MODE] = FREE
-            node[k, S_ARC] = 0.0
-            n = lay.W_NP  # beside a free string S_T holds the normal, see `_caught`
-            tx, ty, tz = turn_into_frame(node, k, node[k, n], node[k, n + 1], node[k, n + 2])
-            node[k, lay.S_T] = tx
-            node[k, lay.S_T + 1] = ty
-            node[k, lay.S_T + 2] = tz
+            _release(k, node)
             dropped += 1
     return dropped
 
@@ -97,8 +99,7 @@ def _hand_over(k, node):
     """Move the contact of row k to its twin, the surface's second row."""
     for i in range(lay.STATE):
         node[k + 1, S_MODE + i] = node[k, S_MODE + i]
-    node[k, S_MODE] = FREE
-    node[k, S_ARC] = 0.0
+    _release(k, node)
 
 
 @jit
@@ -163,8 +164,7 @@ def join(lo, hi, ends, node):
         node[k, S_ARC] = arc + node[k, lay.W_LQ] + node[k + 1, S_ARC]
         geodesic(k, node, ends[0], ends[1], ends[2])
         if node[k, lay.W_KMIN] >= 0.0:
-            node[k + 1, S_MODE] = FREE
-            node[k + 1, S_ARC] = 0.0
+            _release(k + 1, node)
             count += 1
         else:
             node[k, S_ARC] = arc

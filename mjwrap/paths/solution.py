@@ -90,11 +90,12 @@ class PathSolution(Derivatives):
 
     @property
     def branch(self) -> Array:
-        """What a warm start keeps of this path, a copy, (rows, 9), one row per obstacle, two for one with hollows.
+        """What a warm start keeps of this path, a copy, (rows, 11), one row per obstacle, two for one with hollows.
 
-        Columns: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc length [m], in the
-        surface's
-        frame. `solve_path(start=branch)` with the same pose gives the same bits whatever was solved in between.
+        Columns: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc length [m] and lengths of
+        the straight segments before P and after Q (2) [m], in the surface's frame; beside a free surface that has no
+        closed form, the ends of the straight segment stand in the place of P and t. `solve_path(start=branch)` with the
+        same pose gives the same bits whatever was solved in between.
         """
         return self._saved.copy()
 
