@@ -184,8 +184,10 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     rows: list[Row] = []
     print(
-        "model   law                    step  muscles  not finite  not conv.  evaluations  above 10  zigzags  extra  off [F_max]"
+        "model       law                   step   muscles  not finite  not conv.  evaluations  above 10",
+        end="",
     )
+    print("  zigzags  extra  off [F_max]")
     for name in args.models:
         model = myo_sim_spec(name).compile()
         for law in args.laws:
@@ -193,7 +195,8 @@ def main(arguments: list[str] | None = None) -> int:
                 rows.append(row)
                 print(
                     f"{row.model:11} {row.law:21} {1e3 * row.timestep:3.0f} ms  {row.muscles:7}  {row.not_finite:10}  "
-                    f"{row.not_converged:9}  {row.evaluations:11}  {row.above:8}  {row.zigzags:7}  {row.extra:5}  {row.off:.3f}",
+                    f"{row.not_converged:9}  {row.evaluations:11}  {row.above:8}  {row.zigzags:7}  {row.extra:5}  "
+                    f"{row.off:.3f}",
                     flush=True,
                 )
     held = True

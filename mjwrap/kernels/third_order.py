@@ -9,7 +9,7 @@ v = (x − x_0) / r, as in a step of backward Euler. Two evaluations of the forc
 prediction's.
 
 Where the prediction fails, λ and φ are those after a step of backward Euler. Where the velocity changes by more than
-WILD within the step, it is that step itself which counts: it passes no equilibrium.
+WILD within the step, or that step was hard to find, it is that step itself which counts: it passes no equilibrium.
 
 unit: law, activation, damping, fibre height [l_o], l_o / l_s and the unit's length [l_s], at the end of the step;
 gains: by how much activation and that length are greater than at its beginning; pace: their rates at its end times d;
@@ -26,6 +26,7 @@ from mjwrap.kernels.balance import AT_MINIMUM, CLOSE, balance, balanced_forces, 
 SURE = 3e-2  # [F_max] imbalance of a prediction up to which its slopes are good enough for the scheme
 SLOW = 0.25  # of an imbalance: where more than this is left after a Newton step, the prediction has failed
 WILD = 0.4  # [v_max l_o] change of velocity within a step beyond which the step is backward Euler's
+HARD = 4  # evaluations after which backward Euler's step is the last attempt, so that there are ten at most
 GUESS = 1e-4  # last Newton step for the velocity at the beginning: the error left is its square
 LOOSE = 1e-2  # [F_max] imbalance from which one more Newton step makes a backward Euler step good enough
 
@@ -47,12 +48,14 @@ def advance_third_order(unit, gains, pace, start, least, high, span):
         x, pull, more, status = balance(
             law, activation, damping, height, ratio, reach, start, 1.0 / span, least, high, start, LOOSE
         )
-        count += more + 1
+        count += more
         euler, v = x, (x - start) / span
-        now = forces(law, activation, damping, height, ratio, reach, x, v)
-        if status != AT_MINIMUM and now[6] > 0.0 and abs(v - v_before) <= WILD:
-            x, v, before, reduced = _corrected(pace, begun, now, x, v, span)
-            known = abs(v - v_before) <= WILD and least < x < high
+        if count <= HARD and status != AT_MINIMUM and abs(v - v_before) <= WILD:
+            now = forces(law, activation, damping, height, ratio, reach, x, v)
+            count += 1
+            if now[6] > 0.0:
+                x, v, before, reduced = _corrected(pace, begun, now, x, v, span)
+                known = abs(v - v_before) <= WILD and least < x < high
         if not known:
             x, pull, more, status = balance(
                 law, activation, damping, height, ratio, reach, start, 1.0 / span, least, high, euler, CLOSE
