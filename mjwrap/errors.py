@@ -44,3 +44,7 @@ class SignalError(MjwrapError, ValueError):
 
 class RecordingError(MjwrapError, OSError):
     """A recording could not be written: no such folder, no permission, or no space left."""
+
+
+class VersionError(MjwrapError, RuntimeError):
+    """The installed MuJoCo is not one that the engine plugin can verify; `MuscleSystem` works without the plugin."""
