@@ -13,6 +13,7 @@ from mjwrap.errors import (
     RecordingError,
     SignalError,
     StateError,
+    VersionError,
 )
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
         solve_path,
         solve_sweep,
     )
+    from mjwrap.plugin import install, load
     from mjwrap.recording import Recorder
     from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Torus
     from mjwrap.system import MuscleSystem
@@ -113,6 +115,8 @@ _HOMES = {
     "basal_power": "energetics",
     "MuscleSystem": "system",
     "Recorder": "recording",
+    "install": "plugin",
+    "load": "plugin",
 }
 
 __all__ = [
@@ -155,6 +159,7 @@ __all__ = [
     "SweepSolution",
     "Torus",
     "Umberger2010",
+    "VersionError",
     "ViaPoint",
     "basal_power",
     "fit_capsule",
@@ -167,7 +172,9 @@ __all__ = [
     "fit_torus",
     "hill_from_mujoco",
     "implausible",
+    "install",
     "length_ranges",
+    "load",
     "mesh_points",
     "set_laws",
     "simulate_muscle",

@@ -63,9 +63,9 @@ def library() -> Any:
     return loaded
 
 
-def saved_model(address: int) -> bytes:
+def saved_model(address: int) -> ctypes.Array[ctypes.c_char]:
     """Return the model at an address in MuJoCo's binary form."""
     size = library().mj_sizeModel(address)
-    buffer = ctypes.create_string_buffer(size)
+    buffer = (ctypes.c_char * size)()
     library().mj_saveModel(address, None, buffer, size)
-    return buffer.raw
+    return buffer

@@ -1,0 +1,48 @@
+"""The block: all that one instance of the plugin needs of memory for one mjData, in one piece.
+
+It holds a copy of the muscles' arrays (`mjwrap/plan.py`), scratch memory of the kernels and what was added to
+xfrc_applied, so that nothing is shared between threads and nothing outlives its mjData. Its head is an array of words:
+sizes, offsets of MuJoCo's fields, addresses of functions, and where in the block (in bytes) each array starts.
+"""
+
+from __future__ import annotations
+
+# sizes
+BYTES = 0
+MUSCLES, NODES, ROUTES, BODIES, SITES, GEOMS, ACTS, CTRLS = 1, 2, 3, 4, 5, 6, 7, 8
+LOADED, NSTATE = 9, 10  # bodies that muscles pull, numbers in plugin_state
+STATE_ADDRESS = 11  # index of the instance's first number in plugin_state
+# functions
+STAGE, FINISH, FREE = 13, 14, 15  # FREE: gives the block back to the system
+# byte offsets of mjData's and mjModel's fields, in this order
+FIELDS = (
+    "time", "act", "ctrl", "plugin_state", "xfrc_applied", "site_xpos", "geom_xpos", "geom_xmat", "cvel",
+    "subtree_com", "xipos", "opt.timestep", "opt.integrator", "opt.disableflags", "opt.disableactuator",
+)  # fmt: skip
+(
+    TIME, ACT, CTRL, PLUGIN_STATE, XFRC, SITE_XPOS, GEOM_XPOS, GEOM_XMAT, CVEL,
+    SUBTREE_COM, XIPOS, TIMESTEP, INTEGRATOR, DISABLEFLAGS, DISABLEACTUATOR,
+) = range(16, 16 + len(FIELDS))  # fmt: skip
+# MuJoCo's codes: the integrator RK4, the bit of `disableflags` that switches actuation off
+RUNGE_KUTTA, NO_ACTUATION = 32, 33
+# where the arrays start
+ARRAYS = (
+    "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
+    "weights", "params", "ctrl_low", "ctrl_high", "times",
+    "node", "seg", "count", "info", "own", "excitation", "drive", "start_activation", "start_fiber", "start_length",
+    "activation", "fiber", "length", "velocity", "tension", "next_activation", "next_fiber", "status",
+    "wrench", "others", "mine", "total", "off", "written", "clock", "failures",
+)  # fmt: skip
+(
+    A_ROUTES, A_LINKS, A_LAW, A_SOURCE, A_INDEX, A_CONTROL, A_FORM, A_GROUP, A_BODY_ROOTID, A_LOADED,
+    A_WEIGHTS, A_PARAMS, A_CTRL_LOW, A_CTRL_HIGH, A_TIMES,
+    A_NODE, A_SEG, A_COUNT, A_INFO, A_OWN, A_EXCITATION, A_DRIVE, A_START_ACTIVATION, A_START_FIBER, A_START_LENGTH,
+    A_ACTIVATION, A_FIBER, A_LENGTH, A_VELOCITY, A_TENSION, A_NEXT_ACTIVATION, A_NEXT_FIBER, A_STATUS,
+    A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES,
+) = range(40, 40 + len(ARRAYS))  # fmt: skip
+HEAD = 40 + len(ARRAYS)
+
+# entries of `clock`: time of the first evaluation since the last step where the state's own clock says nothing;
+# whether there was an evaluation since the last step
+FIRST, ACTED = 0, 1
+CLOCK = 2

@@ -1,0 +1,108 @@
+"""The functions whose addresses stand in mjpPlugin: they find an instance's block and hand over to it.
+
+A mjData without a block is left alone: while a model compiles, MuJoCo steps data that no plugin has initialised, and
+there plugin_data holds whatever was in memory before; only mjData.nplugin tells.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba.core import types
+
+from mjwrap.kernels.evaluation import evaluate
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import stage as st
+from mjwrap.plugin.callbacks._cache import callback, jit
+from mjwrap.plugin.callbacks.memory import call, half, store_word, word
+
+_WORD, _INT = types.int64, types.int32
+
+
+class Hooks(NamedTuple):
+    """Compiled callbacks, each with an `address`; their order is that of mjpPlugin."""
+
+    destroy: Any
+    copy: Any
+    reset: Any
+    compute: Any
+    advance: Any
+
+
+class Entries(NamedTuple):
+    """Compiled functions that blocks point to, each with an `address`."""
+
+    stage: Any
+    finish: Any
+
+
+def _evaluation() -> tuple[Any, ...]:
+    """Return the types of the arguments with which `stage` calls `evaluate`.
+
+    Large kernels are called by symbols, which loading `evaluate` defines; numba loads a C function from its cache
+    without them.
+    """
+    kinds = {
+        "i": types.int64[::1], "I": types.int64[:, ::1], "b": types.boolean[::1], "s": types.float64,
+        "r": types.float64[::1], "R": types.float64[:, ::1],
+    }  # fmt: skip
+    plan, poses, states = "IrIiRiiirriR" + "bi", "RRRRRR", "rrRr" + "sss"
+    paths, results = "RRiR", "rrrr" + "rrrrrrr" + "iR"
+    return tuple(kinds[letter] for letter in plan + poses + states + paths + results)
+
+
+def compile_entries() -> Entries:
+    """Compile, or load, what is the same for every MuJoCo: the one place where the kernels are linked in."""
+    signature = types.void(_WORD, _WORD, _WORD)
+    evaluate.compile(_evaluation())
+    return Entries(callback(signature, st.stage), callback(signature, st.finish))
+
+
+@jit
+def _block(data, instance, nplugin, plugin_data):
+    """Return the address of an instance's block, 0 where there is none."""
+    if instance >= half(data + nplugin):
+        return 0
+    return word(word(data + plugin_data) + 8 * instance)
+
+
+def compile_hooks(offsets: dict[str, int]) -> Hooks:
+    """Compile, or load, the callbacks for the mjData whose `nplugin` and `plugin_data` lie at these offsets."""
+    nplugin, plugin_data = offsets["nplugin"], offsets["plugin_data"]
+
+    def destroy(data, instance):
+        block = _block(data, instance, nplugin, plugin_data)
+        if block != 0:
+            store_word(word(data + plugin_data) + 8 * instance, 0)
+            call(word(block + 8 * bk.FREE), block, 0, 0)
+
+    def copy(target, model, origin, instance):
+        to, given = (
+            _block(target, instance, nplugin, plugin_data),
+            _block(origin, instance, nplugin, plugin_data),
+        )
+        if to != 0 and given != 0 and word(to) == word(given):
+            for i in range(word(given) // 8):
+                store_word(to + 8 * i, word(given + 8 * i))
+
+    def reset(model, state, block, instance):
+        if block != 0:
+            st.forget(block, state)
+
+    def compute(model, data, instance, capability):
+        block = _block(data, instance, nplugin, plugin_data)
+        if block != 0:
+            call(word(block + 8 * bk.STAGE), block, model, data)
+
+    def advance(model, data, instance):
+        block = _block(data, instance, nplugin, plugin_data)
+        if block != 0:
+            call(word(block + 8 * bk.FINISH), block, model, data)
+
+    return Hooks(
+        callback(types.void(_WORD, _INT), destroy),
+        callback(types.void(_WORD, _WORD, _WORD, _INT), copy),
+        callback(types.void(_WORD, _WORD, _WORD, _INT), reset),
+        callback(types.void(_WORD, _WORD, _INT, _INT), compute),
+        callback(types.void(_WORD, _WORD, _INT), advance),
+    )

@@ -1,0 +1,82 @@
+"""Raw memory in compiled code: words and arrays at an address, calls of a function by its address."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic as numba_intrinsic
+from numba.np.numpy_support import carray
+
+from mjwrap.plugin.callbacks._cache import jit
+
+_WORD = ir.IntType(64)
+intrinsic: Any = numba_intrinsic  # what it returns takes other arguments than what it decorates
+
+
+def _load(kind: Any, numba_type: Any) -> Any:
+    def typed(typing_context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.load(builder.inttoptr(arguments[0], kind.as_pointer()))
+
+        return numba_type(types.int64), generate
+
+    return intrinsic(typed)
+
+
+word: Any = _load(_WORD, types.int64)  # the 64-bit integer at an address
+half: Any = _load(ir.IntType(32), types.int32)  # the 32-bit integer at an address
+real: Any = _load(ir.DoubleType(), types.float64)  # the double at an address
+
+
+@intrinsic
+def pointer(typing_context: Any, address: Any) -> Any:
+    """Return an address as a pointer of no type."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.int64), generate
+
+
+@intrinsic
+def store_word(typing_context: Any, address: Any, value: Any) -> Any:
+    """Write a 64-bit integer to an address."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(arguments[1], builder.inttoptr(arguments[0], _WORD.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64), generate
+
+
+@intrinsic
+def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any) -> Any:
+    """Call void f(word, word, word) by its address."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [_WORD] * 3)
+        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), list(arguments[1:]))
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64, types.int64), generate
+
+
+@jit
+def reals(address, shape):
+    """Return the doubles at an address as an array of the given shape."""
+    return carray(pointer(address), shape, np.float64)
+
+
+@jit
+def words(address, shape):
+    """Return the 64-bit integers at an address as an array of the given shape."""
+    return carray(pointer(address), shape, np.int64)
+
+
+@jit
+def flags(address, shape):
+    """Return the bytes at an address as an array of booleans of the given shape."""
+    return carray(pointer(address), shape, np.bool_)

@@ -1,0 +1,297 @@
+"""One evaluation of an instance's muscles inside MuJoCo, and the end of a step.
+
+Numbers in plugin_state, per instance: the time at which the last step ended; activation and fibre length of muscles
+that keep them nowhere else (n, 2); excitations (n,); length, velocity and tension (3, n) and the segments of the last
+good paths; the saved solution and the hint of every surface; what is in xfrc_applied now. Zeros are a cold start: so a
+state made by hand is as good as one that MuJoCo has reset.
+
+`stage` and `finish` are compiled in `hooks.py`, as C functions only: another layer would optimise all kernels again.
+"""
+
+from __future__ import annotations
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels import segments as sg
+from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, ROUTE, put, take_back
+from mjwrap.kernels.dynamics import write_states
+from mjwrap.kernels.evaluation import evaluate
+from mjwrap.kernels.muscle import PARAMS
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word, words
+
+TOLERANCE = 1e-10  # largest tangency error of a path, as in MuscleSystem
+GROUPS = 31  # actuator groups that options can switch off
+PER_MUSCLE = 6
+SAVED = lay.STATE + 4  # of a surface: the solution, then the hint
+
+
+@jit
+def _floats(block, which, shape):
+    return reals(block + word(block + 8 * which), shape)
+
+
+@jit
+def _ints(block, which, shape):
+    return words(block + word(block + 8 * which), shape)
+
+
+@jit
+def _state(block, data):
+    """Return the instance's part of plugin_state."""
+    start = word(data + word(block + 8 * bk.PLUGIN_STATE)) + 8 * word(block + 8 * bk.STATE_ADDRESS)
+    return reals(start, (word(block + 8 * bk.NSTATE),))
+
+
+@jit
+def _sizes(block):
+    """Return the numbers of muscles, nodes, routes and bodies."""
+    n, nodes = word(block + 8 * bk.MUSCLES), word(block + 8 * bk.NODES)
+    return n, nodes, word(block + 8 * bk.ROUTES), word(block + 8 * bk.BODIES)
+
+
+@jit
+def _exchange(block, state, save):
+    """Copy between plugin_state and the block: warm starts, own states, excitations and last good forces.
+
+    Modes are stored as their distance from COLD, so that zeros are cold. The excitations are read, never written.
+    """
+    n, nodes, routes, _ = _sizes(block)
+    node, seg = (
+        _floats(block, bk.A_NODE, (nodes, lay.ROW)),
+        _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
+    )
+    links, route = _ints(block, bk.A_LINKS, (nodes, 4)), _ints(block, bk.A_ROUTES, (routes, ROUTE))
+    count, own = _ints(block, bk.A_COUNT, (routes,)), _floats(block, bk.A_OWN, (n, 2))
+    excitation = _floats(block, bk.A_EXCITATION, (n,))
+    length, velocity = _floats(block, bk.A_LENGTH, (n,)), _floats(block, bk.A_VELOCITY, (n,))
+    tension = _floats(block, bk.A_TENSION, (n,))
+    at = 1
+    for m in range(n):
+        if save:
+            state[at], state[at + 1] = own[m, 0], own[m, 1]
+            state[at + 3], state[at + 4], state[at + 5] = length[m], velocity[m], tension[m]
+        else:
+            own[m, 0], own[m, 1], excitation[m] = state[at], state[at + 1], state[at + 2]
+            length[m], velocity[m], tension[m] = state[at + 3], state[at + 4], state[at + 5]
+        at += PER_MUSCLE
+    for c in range(routes):
+        surfaces = False
+        for k in range(route[c, R_LO], route[c, R_HI]):
+            if links[k, L_GEOM] < 0:
+                continue
+            surfaces = True
+            if save:
+                state[at] = node[k, lay.S_MODE] - lay.COLD
+                for i in range(1, lay.STATE):
+                    state[at + i] = node[k, lay.S_MODE + i]
+                for i in range(4):
+                    state[at + lay.STATE + i] = node[k, lay.HINT + i]
+            else:
+                node[k, lay.S_MODE] = state[at] + lay.COLD
+                for i in range(1, lay.STATE):
+                    node[k, lay.S_MODE + i] = state[at + i]
+                for i in range(4):
+                    node[k, lay.HINT + i] = state[at + lay.STATE + i]
+            at += SAVED
+        if not surfaces:
+            continue  # a path of straight segments is always found
+        first, last = route[c, R_LO] + c, route[c, R_HI] + c + 1
+        if save:
+            state[at] = count[c]
+        else:
+            count[c] = int(state[at])
+        at += 1
+        for j in range(first, last):
+            for i in range(sg.SEGMENT):
+                if save:
+                    state[at + i] = seg[j, i]
+                else:
+                    seg[j, i] = state[at + i]
+            at += sg.SEGMENT
+    return at
+
+
+@jit
+def _forces(block, data):
+    """Return xfrc_applied and the arrays that `coupling.put` and `take_back` share."""
+    bodies = word(block + 8 * bk.BODIES)
+    return (
+        reals(word(data + word(block + 8 * bk.XFRC)), (bodies, 6)),
+        _floats(block, bk.A_OTHERS, (bodies, 6)),
+        _floats(block, bk.A_MINE, (bodies, 6)),
+        _floats(block, bk.A_TOTAL, (bodies, 6)),
+        flags(block + word(block + 8 * bk.A_WRITTEN), (bodies,)),
+    )
+
+
+@jit
+def _retreat(block, data, state):
+    """Take out of xfrc_applied what this instance put in, or what a restored state says that it had."""
+    xfrc, others, mine, total, written = _forces(block, data)
+    loaded = _ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
+    at = state.shape[0] - 13 * loaded.shape[0]
+    for j in range(loaded.shape[0]):
+        b = loaded[j]
+        same = state[at] != 0.0
+        for i in range(6):
+            same = same and xfrc[b, i] == state[at + 7 + i]
+        if same:
+            for i in range(6):
+                xfrc[b, i] = state[at + 1 + i]
+            written[b] = False
+        state[at] = 0.0
+        for i in range(12):
+            state[at + 1 + i] = 0.0
+        at += 13
+    take_back(xfrc, others, mine, total, written)
+
+
+@jit
+def _advance_into(block, data, state, wrench):
+    """Put the wrench into xfrc_applied and note in plugin_state what is there now."""
+    xfrc, others, mine, total, written = _forces(block, data)
+    put(xfrc, others, mine, total, written, wrench)
+    loaded = _ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
+    at = state.shape[0] - 13 * loaded.shape[0]
+    for j in range(loaded.shape[0]):
+        b = loaded[j]
+        if written[b]:
+            state[at] = 1.0
+            for i in range(6):
+                state[at + 1 + i], state[at + 7 + i] = others[b, i], total[b, i]
+        at += 13
+
+
+@jit
+def _since(time, step, ended, clock):
+    """Return how long ago the step began [s] to which this stage of Runge-Kutta belongs.
+
+    A stage's time is computed as the step's start plus half or all of a step, so it is recognised to the bit.
+    """
+    for start in (ended, clock[bk.FIRST]):
+        if time == start:
+            return 0.0
+        if time == start + 0.5 * step:
+            return 0.5 * step
+        if time == start + step:
+            return step
+    clock[bk.FIRST] = time
+    return 0.0
+
+
+def stage(block, model, data):
+    """Evaluate the instance's muscles at the poses and velocities in mjData; add their wrenches to xfrc_applied."""
+    state = _state(block, data)
+    _retreat(block, data, state)
+    clock = _floats(block, bk.A_CLOCK, (bk.CLOCK,))
+    if half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION):
+        clock[bk.ACTED] = 0.0
+        return
+    n, nodes, routes, bodies = _sizes(block)
+    step, since, ahead = real(model + word(block + 8 * bk.TIMESTEP)), 0.0, 0.0
+    if half(model + word(block + 8 * bk.INTEGRATOR)) == word(block + 8 * bk.RUNGE_KUTTA):
+        since = _since(real(data + word(block + 8 * bk.TIME)), step, state[0], clock)
+    else:
+        ahead = step
+    if since == 0.0:
+        _exchange(block, state, False)
+    off, group = flags(block + word(block + 8 * bk.A_OFF), (n,)), _ints(block, bk.A_GROUP, (n,))
+    switched = half(model + word(block + 8 * bk.DISABLEACTUATOR))
+    for m in range(n):
+        off[m] = 0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0
+    wrench = _floats(block, bk.A_WRENCH, (bodies, 6))
+    evaluate(
+        _ints(block, bk.A_ROUTES, (routes, ROUTE)),
+        _floats(block, bk.A_WEIGHTS, (routes,)),
+        _ints(block, bk.A_LINKS, (nodes, 4)),
+        _ints(block, bk.A_LAW, (n,)),
+        _floats(block, bk.A_PARAMS, (n, PARAMS)),
+        _ints(block, bk.A_SOURCE, (n,)),
+        _ints(block, bk.A_INDEX, (n,)),
+        _ints(block, bk.A_CONTROL, (n,)),
+        _floats(block, bk.A_CTRL_LOW, (n,)),
+        _floats(block, bk.A_CTRL_HIGH, (n,)),
+        _ints(block, bk.A_FORM, (n,)),
+        _floats(block, bk.A_TIMES, (n, 3)),
+        off,
+        _ints(block, bk.A_BODY_ROOTID, (bodies,)),
+        reals(word(data + word(block + 8 * bk.SITE_XPOS)), (word(block + 8 * bk.SITES), 3)),
+        reals(word(data + word(block + 8 * bk.GEOM_XPOS)), (word(block + 8 * bk.GEOMS), 3)),
+        reals(word(data + word(block + 8 * bk.GEOM_XMAT)), (word(block + 8 * bk.GEOMS), 9)),
+        reals(word(data + word(block + 8 * bk.CVEL)), (bodies, 6)),
+        reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
+        reals(word(data + word(block + 8 * bk.XIPOS)), (bodies, 3)),
+        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
+        reals(word(data + word(block + 8 * bk.CTRL)), (word(block + 8 * bk.CTRLS),)),
+        _floats(block, bk.A_OWN, (n, 2)),
+        _floats(block, bk.A_EXCITATION, (n,)),
+        since,
+        ahead,
+        TOLERANCE,
+        _floats(block, bk.A_NODE, (nodes, lay.ROW)),
+        _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
+        _ints(block, bk.A_COUNT, (routes,)),
+        _floats(block, bk.A_INFO, (routes, lay.INFO)),
+        _floats(block, bk.A_DRIVE, (n,)),
+        _floats(block, bk.A_START_ACTIVATION, (n,)),
+        _floats(block, bk.A_START_FIBER, (n,)),
+        _floats(block, bk.A_START_LENGTH, (n,)),
+        _floats(block, bk.A_ACTIVATION, (n,)),
+        _floats(block, bk.A_FIBER, (n,)),
+        _floats(block, bk.A_LENGTH, (n,)),
+        _floats(block, bk.A_VELOCITY, (n,)),
+        _floats(block, bk.A_TENSION, (n,)),
+        _floats(block, bk.A_NEXT_ACTIVATION, (n,)),
+        _floats(block, bk.A_NEXT_FIBER, (n,)),
+        _ints(block, bk.A_STATUS, (n,)),
+        wrench,
+    )
+    _advance_into(block, data, state, wrench)
+    clock[bk.ACTED] = 1.0
+
+
+def finish(block, model, data):
+    """End a step: leave others' forces in xfrc_applied, keep states and warm starts in plugin_state."""
+    state = _state(block, data)
+    _retreat(block, data, state)
+    clock = _floats(block, bk.A_CLOCK, (bk.CLOCK,))
+    clock[bk.FIRST] = -1.0
+    state[0] = real(data + word(block + 8 * bk.TIME))
+    if clock[bk.ACTED] == 0.0:
+        return
+    clock[bk.ACTED] = 0.0
+    n = word(block + 8 * bk.MUSCLES)
+    write_states(
+        _ints(block, bk.A_SOURCE, (n,)),
+        _ints(block, bk.A_INDEX, (n,)),
+        _floats(block, bk.A_NEXT_ACTIVATION, (n,)),
+        _floats(block, bk.A_NEXT_FIBER, (n,)),
+        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
+        _floats(block, bk.A_OWN, (n, 2)),
+    )
+    _exchange(block, state, True)
+    status, failures = _ints(block, bk.A_STATUS, (n,)), _ints(block, bk.A_FAILURES, (n,))
+    for m in range(n):
+        if status[m] != lay.CONVERGED:
+            failures[m] += 1
+
+
+@jit
+def forget(block, state):
+    """After a reset of mjData, which has cleared xfrc_applied: start cold, with nothing to take back.
+
+    state: address of the instance's numbers in plugin_state, which MuJoCo leaves as they were, or undefined.
+    """
+    cold = reals(state, (word(block + 8 * bk.NSTATE),))
+    for i in range(cold.shape[0]):
+        cold[i] = 0.0
+    n, _, _, bodies = _sizes(block)
+    failures = _ints(block, bk.A_FAILURES, (n,))
+    for m in range(n):
+        failures[m] = 0
+    written = flags(block + word(block + 8 * bk.A_WRITTEN), (bodies,))
+    for b in range(bodies):
+        written[b] = False
+    clock = _floats(block, bk.A_CLOCK, (bk.CLOCK,))
+    clock[bk.FIRST], clock[bk.ACTED] = -1.0, 0.0

@@ -1,0 +1,87 @@
+"""The first contents of a block, written from the compiled model that it is to serve."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.kernels import coupling, layout, segments
+from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.plan import Plan
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import stage
+from mjwrap.plugin.callbacks.hooks import Entries
+from mjwrap.plugin.offsets import offsets
+
+Words = NDArray[np.int64]
+
+
+def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
+    """Return the ids of the bodies on which the muscles of a plan can act."""
+    ends = plan.routes[:, [coupling.R_FROM_BODY, coupling.R_TO_BODY]].ravel()
+    return np.unique(np.concatenate([plan.links[:, coupling.L_BODY], ends]))
+
+
+def state_size(plan: Plan) -> int:
+    """Return how many numbers of plugin_state the muscles of a plan need; `stage.py` says what they are."""
+    numbers = 1 + stage.PER_MUSCLE * plan.n + 13 * len(loaded_bodies(plan))
+    for low, high in plan.routes[:, [coupling.R_LO, coupling.R_HI]]:
+        surfaces = int(np.count_nonzero(plan.links[low:high, coupling.L_GEOM] >= 0))
+        if surfaces:
+            numbers += surfaces * stage.SAVED + 1 + int(high - low + 1) * segments.SEGMENT
+    return numbers
+
+
+def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> dict[str, Any]:
+    n, nodes, routes = plan.n, len(plan.node), len(plan.routes)
+    groups = [int(model.actuator_group[m.actuator]) if m.actuator >= 0 else -1 for m in muscles]
+    arrays: dict[str, Any] = {name: getattr(plan, name) for name in bk.ARRAYS if hasattr(plan, name)}
+    arrays |= {
+        "group": np.array(groups, dtype=np.int64),
+        "body_rootid": np.array(model.body_rootid, dtype=np.int64),
+        "loaded": loaded_bodies(plan),
+        "seg": np.zeros((nodes + routes, segments.SEGMENT)),
+        "count": np.zeros(routes, dtype=np.int64),
+        "info": np.zeros((routes, layout.INFO)),
+        "own": np.zeros((n, 2)),
+        "status": np.zeros(n, dtype=np.int64),
+        "failures": np.zeros(n, dtype=np.int64),
+        "off": np.zeros(n, dtype=np.bool_),
+        "written": np.zeros(model.nbody, dtype=np.bool_),
+        "clock": np.zeros(bk.CLOCK),
+    }
+    arrays |= {name: np.zeros((model.nbody, 6)) for name in ("wrench", "others", "mine", "total")}
+    return {name: arrays.get(name, np.zeros(n)) for name in bk.ARRAYS}
+
+
+def block_image(
+    model: mujoco.MjModel,
+    instance: int,
+    plan: Plan,
+    muscles: list[MuscleDeclaration],
+    entries: Entries,
+    free: int,
+) -> bytes:
+    """Return the block for an instance of the plugin; free: address of the function that gives its memory back."""
+    head = np.zeros(bk.HEAD, dtype=np.int64)
+    head[bk.MUSCLES], head[bk.NODES], head[bk.ROUTES] = plan.n, len(plan.node), len(plan.routes)
+    head[bk.BODIES], head[bk.SITES], head[bk.GEOMS] = model.nbody, model.nsite, model.ngeom
+    head[bk.ACTS], head[bk.CTRLS] = model.na, model.nu
+    head[bk.LOADED], head[bk.NSTATE] = len(loaded_bodies(plan)), state_size(plan)
+    head[bk.STATE_ADDRESS] = model.plugin_stateadr[instance]
+    head[bk.STAGE], head[bk.FINISH], head[bk.FREE] = entries.stage.address, entries.finish.address, free
+    head[bk.RUNGE_KUTTA] = int(mujoco.mjtIntegrator.mjINT_RK4)
+    head[bk.NO_ACTUATION] = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    fields = offsets().data | offsets().model
+    head[bk.TIME : bk.TIME + len(bk.FIELDS)] = [fields[name] for name in bk.FIELDS]
+    pieces, here = [], 8 * bk.HEAD
+    for place, array in enumerate(_arrays(model, plan, muscles).values(), start=bk.A_ROUTES):
+        head[place] = here
+        piece = np.ascontiguousarray(array).tobytes()
+        pieces.append(piece + bytes(-len(piece) % 8))
+        here += len(pieces[-1])
+    head[bk.BYTES] = here
+    return head.tobytes() + b"".join(pieces)

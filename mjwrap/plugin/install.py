@@ -1,0 +1,105 @@
+"""Putting the plugin into a model: `install` for an MjSpec, `load` for a file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import mujoco
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf import read_declarations, read_model
+from mjwrap.plugin import register as reg
+from mjwrap.plugin.image import state_size
+from mjwrap.takeover import Takeover
+
+_BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+
+
+def install(spec: mujoco.MjSpec, mode: str = "wrench") -> mujoco.MjModel:
+    """Give the muscles of an MjSpec to the engine plugin; return the compiled model, whose `mj_step` runs them.
+
+    The spec itself is changed (an instance of the plugin, actuators without force), so that it can be compiled again,
+    attached and saved. Raises `ModelError` where its muscles cannot be read, `VersionError` where MuJoCo is unknown.
+    """
+    if not isinstance(spec, mujoco.MjSpec):
+        raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
+    if mode != "wrench":
+        raise ModelError(f"mode '{mode}' does not exist; modes: wrench")
+    reg.register()
+    for element in [p for p in spec.plugins if p.plugin_name == reg.NAME and p.name == reg.INSTANCE]:
+        element.config = reg.configuration([], 1)  # installed before: read the muscles anew
+    model = _compile(spec)
+    if int(model.opt.disableflags) & _BOTH_OFF == _BOTH_OFF:
+        raise ModelError(
+            "MuJoCo calls no passive plugins while springs and dampers are both disabled; enable one of them"
+        )
+    reg.hush_to_silence(model)
+    with Takeover(model).suspended():
+        declared = read_declarations(model).muscles
+        taken = {name for p in spec.plugins if p.plugin_name == reg.NAME for name in _claimed(p)}
+        muscles = [muscle for muscle in declared if muscle.name not in taken]
+        if not muscles and not taken:
+            raise ModelError("the model declares no muscle that mjwrap could drive")
+        actuators = {element.id: element for element in spec.actuators}
+        for muscle in muscles:
+            if muscle.actuator >= 0:
+                _silence(model, muscle.actuator, actuators[muscle.actuator])
+    plan, _ = reg.read_plan(model, [muscle.name for muscle in muscles])
+    _add_instance(spec, reg.configuration([muscle.name for muscle in muscles], state_size(plan)))
+    return _compile(spec)
+
+
+def load(path: str | os.PathLike[str], mode: str = "wrench") -> mujoco.MjModel:
+    """Load an MJCF file with its muscles in the engine plugin, or an MJB file of a model that has it."""
+    reg.register()
+    model = read_model(path)
+    if Path(path).suffix != ".mjb":
+        return install(mujoco.MjSpec.from_file(os.fspath(path)), mode)
+    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
+    if not any(name.endswith(reg.INSTANCE) for name in names):
+        raise ModelError(
+            f"{path} has no plugin of mjwrap, and an MJB file cannot be changed; load its XML instead"
+        )
+    return model
+
+
+def _claimed(element: mujoco.MjsPlugin) -> list[str]:
+    config = dict(element.config)
+    return reg.read_claim(element.name, config.get(reg.MUSCLES, ""), config.get(reg.NUMBERS, "")).muscles
+
+
+def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    reg.take_error()
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = reg.take_error()
+        raise ModelError(str(reason) if reason else f"the model does not compile: {error}") from reason
+
+
+def _silence(model: mujoco.MjModel, actuator: int, element: mujoco.MjsActuator) -> None:
+    """Clamp an actuator's force, with the marks that `Takeover` reads; the model shows the limits as written."""
+    limited = bool(model.actuator_forcelimited[actuator])
+    low, high = (float(x) for x in model.actuator_forcerange[actuator])
+    if not limited:
+        low, high = -mujoco.mjMAXVAL, mujoco.mjMAXVAL
+    element.gainprm[-1], element.biasprm[-1] = low, high
+    element.forcelimited, element.forcerange = 1, reg.HUSHED
+
+
+def _add_instance(spec: mujoco.MjSpec, config: dict[str, str]) -> None:
+    """Add the instance, or give the one that is there its new configuration.
+
+    MuJoCo's `attach` keeps only instances that an element names, so a body does: the first one without a plugin.
+    """
+    for element in spec.plugins:
+        if element.plugin_name == reg.NAME and element.name == reg.INSTANCE:
+            element.config = config
+            return
+    spec.activate_plugin(reg.NAME)
+    spec.add_plugin(name=reg.INSTANCE, plugin_name=reg.NAME, active=True).config = config
+    for body in spec.bodies[1:]:
+        if not body.plugin.active:
+            body.plugin.name, body.plugin.plugin_name, body.plugin.active = reg.INSTANCE, reg.NAME, True
+            return
