@@ -297,3 +297,16 @@ def test_a_model_changed_after_install_is_refused_by_name(capfd: pytest.CaptureF
         spec.compile()
     assert "no muscle 'extensor' any more" in capfd.readouterr().err
     assert install(spec).nplugin == 1
+
+
+@pytest.mark.parametrize("garbage", [np.nan, np.inf, -1e300, 7.0])
+def test_a_state_that_means_nothing_is_survived(garbage: float) -> None:
+    """Anybody may write to plugin_state; a reset cures it."""
+    model = install(spec_of(SCENES["elastic arm"]))
+    data, fresh = mujoco.MjData(model), mujoco.MjData(model)
+    data.plugin_state[:] = garbage
+    mujoco.mj_forward(model, data)
+    mujoco.mj_resetData(model, data)
+    for each in (data, fresh):
+        mujoco.mj_step(model, each, nstep=3)
+    np.testing.assert_array_equal(state_of(data), state_of(fresh))

@@ -1,6 +1,6 @@
 """The engine plugin: plain `mj_step`, the viewer, `rollout` and `batch` run the muscles, with no Python in the loop."""
 
-from mjwrap.plugin.install import install, load
+from mjwrap.plugin.installing import install, load
 from mjwrap.plugin.readout import Readout, excitations, read
 
 __all__ = ["Readout", "excitations", "install", "load", "read"]

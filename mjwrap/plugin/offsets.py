@@ -41,6 +41,18 @@ class Offsets(NamedTuple):
     model: dict[str, int]
 
 
+class ModelBuffer(NamedTuple):
+    """Where mjModel keeps its arrays: byte offsets of `buffer`, `nbuffer` and of the pointer to each array by name.
+
+    sizes [bytes]: how much of the struct, from its start, are the model's sizes.
+    """
+
+    buffer: int
+    nbuffer: int
+    sizes: int
+    arrays: dict[str, int]
+
+
 def _refuse(what: str) -> VersionError:
     return VersionError(
         f"the engine plugin cannot run in MuJoCo {mujoco.__version__}: {what}; MuscleSystem works without it"
@@ -153,6 +165,22 @@ def offsets() -> Offsets:
             kind = ctypes.c_double if name == "timestep" else ctypes.c_int
             _check_value(living, f"opt.{name}", kind, found.model[f"opt.{name}"], getattr(living.opt, name))
     return found
+
+
+def model_buffer() -> ModelBuffer:
+    """Return where mjModel keeps its arrays; `VersionError` where one of them is elsewhere in a model of ours."""
+    fields = _structs()["mjModel"].fields
+    at = _walk(fields)[0]
+    pointers = {
+        f.name: at[f.name] for f in fields if type(f.type).__name__ == "PointerType" and f.name != "buffer"
+    }
+    for model, _ in _probes():
+        for name, offset in pointers.items():
+            shown = getattr(model, name, None)
+            if isinstance(shown, np.ndarray) and shown.size:
+                _check_pointer(model, name, offset)
+        _check_value(model, "nbuffer", ctypes.c_int64, at["nbuffer"], model.nbuffer)
+    return ModelBuffer(at["buffer"], at["nbuffer"], at["opt"], pointers)
 
 
 def verify_plugin_fields(model: mujoco.MjModel, data: mujoco.MjData) -> None:

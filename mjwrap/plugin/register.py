@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import hashlib
 import os
 import sys
 import threading
@@ -24,6 +23,7 @@ from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf import MuscleDeclaration, read_declarations
 from mjwrap.plan import Plan, build_plan
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries, compile_hooks
+from mjwrap.plugin.fingerprint import fingerprint
 from mjwrap.plugin.image import block_image, state_size
 from mjwrap.plugin.library import MjpPlugin, library, saved_model
 from mjwrap.plugin.offsets import offsets, verify_plugin_fields
@@ -45,7 +45,7 @@ _INIT = ctypes.CFUNCTYPE(_INT, _WORD, _WORD, _INT)
 _NOTHING = ctypes.CFUNCTYPE(None)
 
 _LOCK = threading.Lock()
-_IMAGES: OrderedDict[tuple[bytes, int], bytes] = OrderedDict()
+_IMAGES: OrderedDict[tuple[bytes | None, int], bytes] = OrderedDict()
 _here = threading.local()  # .reading: init is reading a copy of the model; .error: why init failed last
 
 
@@ -102,12 +102,12 @@ def read_plan(model: mujoco.MjModel, names: list[str]) -> tuple[Plan, list[Muscl
 
 def _image(address: int, instance: int) -> bytes:
     """Return the block for an instance of the model at an address; those of the last models are kept."""
-    saved = saved_model(address)
-    key = hashlib.blake2b(saved, digest_size=16).digest(), instance
+    key = fingerprint(address), instance
     with _LOCK:
         if key in _IMAGES:
             _IMAGES.move_to_end(key)
             return _IMAGES[key]
+    saved = saved_model(address)
     _here.reading = True
     try:
         model = mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": saved.raw})
@@ -121,6 +121,8 @@ def _image(address: int, instance: int) -> bytes:
             f"{state_size(plan)} numbers and has {claim.numbers}; call install again"
         )
     image = block_image(model, instance, plan, muscles, _entries(), _free())
+    if key[0] is None:
+        return image
     with _LOCK:
         _IMAGES[key] = image
         while len(_IMAGES) > _KEPT_IMAGES:

@@ -100,7 +100,8 @@ def _exchange(block, state, save):
         if save:
             state[at] = count[c]
         else:
-            count[c] = int(state[at])
+            fits = 0.0 <= state[at] <= last - first  # anybody may write to plugin_state
+            count[c] = int(state[at]) if fits else 0
         at += 1
         for j in range(first, last):
             for i in range(sg.SEGMENT):
