@@ -310,3 +310,33 @@ def test_a_state_that_means_nothing_is_survived(garbage: float) -> None:
     for each in (data, fresh):
         mujoco.mj_step(model, each, nstep=3)
     np.testing.assert_array_equal(state_of(data), state_of(fresh))
+
+
+def test_tendons_that_only_show_the_way_are_left_out(tmp_path: Path) -> None:
+    """The motion stays the same, and a model without them still knows where its muscles run."""
+    lean, full = install(spec_of(SCENES["arm"])), install(spec_of(SCENES["arm"]), keep_tendons=True)
+    assert lean.tendon_num.tolist() == [0]
+    assert full.tendon_num.tolist() == [6]
+    mujoco.mj_saveModel(lean, str(tmp_path / "lean.mjb"))
+    datas = [moving(model) for model in (lean, full, copy.copy(lean), load(tmp_path / "lean.mjb"))]
+    for data in datas:
+        data.ctrl[:] = 0.6
+        mujoco.mj_step(data.model, data, nstep=50)
+        np.testing.assert_array_equal(state_of(data), state_of(datas[0]))
+    assert full.ntendon == 1
+    assert datas[0].ten_length[0] == 0.0 < datas[1].ten_length[0]
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('<spatial name="extensor">', '<spatial name="extensor" stiffness="1">'),
+        ('<spatial name="extensor">', '<spatial name="extensor" range="0 2" limited="true">'),
+        ("</mujoco>", '<sensor><tendonpos tendon="extensor"/></sensor></mujoco>'),
+        ("</mujoco>", '<sensor><actuatorvel actuator="extensor"/></sensor></mujoco>'),
+        ("</mujoco>", '<equality><tendon tendon1="extensor"/></equality></mujoco>'),
+        ("</actuator>", '<motor tendon="extensor"/></actuator>'),
+    ],
+)
+def test_tendons_that_somebody_needs_stay(before: str, after: str) -> None:
+    assert install(spec_of(SCENES["arm"].replace(before, after))).tendon_num.tolist() == [6]

@@ -11,16 +11,19 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf import read_declarations, read_model
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.image import state_size
+from mjwrap.plugin.placeholders import drop_placeholders
 from mjwrap.takeover import Takeover
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 
 
-def install(spec: mujoco.MjSpec, mode: str = "wrench") -> mujoco.MjModel:
+def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
     """Give the muscles of an MjSpec to the engine plugin; return the compiled model, whose `mj_step` runs them.
 
     The spec itself is changed (an instance of the plugin, actuators without force), so that it can be compiled again,
-    attached and saved. Raises `ModelError` where its muscles cannot be read, `VersionError` where MuJoCo is unknown.
+    attached and saved. mode: "wrench". keep_tendons: let MuJoCo go on computing, and drawing, the tendons that only say
+    where a muscle runs; else the returned model leaves out those that nothing else needs. Raises `ModelError` where its
+    muscles cannot be read, `VersionError` where MuJoCo is unknown.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
@@ -47,15 +50,18 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench") -> mujoco.MjModel:
                 _silence(model, muscle.actuator, actuators[muscle.actuator])
     plan, _ = reg.read_plan(model, [muscle.name for muscle in muscles])
     _add_instance(spec, reg.configuration([muscle.name for muscle in muscles], state_size(plan)))
-    return _compile(spec)
+    model = _compile(spec)
+    if not keep_tendons:
+        drop_placeholders(model, declared)
+    return model
 
 
-def load(path: str | os.PathLike[str], mode: str = "wrench") -> mujoco.MjModel:
-    """Load an MJCF file with its muscles in the engine plugin, or an MJB file of a model that has it."""
+def load(path: str | os.PathLike[str], mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
+    """Load an MJCF file with its muscles in the engine plugin (`install`), or an MJB file of a model that has it."""
     reg.register()
     model = read_model(path)
     if Path(path).suffix != ".mjb":
-        return install(mujoco.MjSpec.from_file(os.fspath(path)), mode)
+        return install(mujoco.MjSpec.from_file(os.fspath(path)), mode, keep_tendons=keep_tendons)
     names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
     if not any(name.endswith(reg.INSTANCE) for name in names):
         raise ModelError(

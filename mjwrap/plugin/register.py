@@ -27,6 +27,7 @@ from mjwrap.plugin.fingerprint import fingerprint
 from mjwrap.plugin.image import block_image, state_size
 from mjwrap.plugin.library import MjpPlugin, library, saved_model
 from mjwrap.plugin.offsets import offsets, verify_plugin_fields
+from mjwrap.plugin.placeholders import restore_placeholders
 from mjwrap.takeover import Takeover
 
 NAME = "mjwrap.muscles"
@@ -88,6 +89,7 @@ def hush_to_silence(model: mujoco.MjModel) -> None:
 def read_plan(model: mujoco.MjModel, names: list[str]) -> tuple[Plan, list[MuscleDeclaration]]:
     """Return the named muscles of a model and their arrays; `ModelError` where one is missing."""
     hush_to_silence(model)
+    restore_placeholders(model)
     with Takeover(model).suspended():
         declared = {muscle.name: muscle for muscle in read_declarations(model).muscles}
     missing = [name for name in names if name not in declared]
