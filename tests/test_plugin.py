@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_mode
 import mjwrap as mw
 from mjwrap.plugin import excitations, install, load, read
 
+ROOT = Path(__file__).resolve().parent.parent
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 RK4 = int(INTEGRATORS["mjINT_RK4"])
 
@@ -340,3 +343,21 @@ def test_tendons_that_only_show_the_way_are_left_out(tmp_path: Path) -> None:
 )
 def test_tendons_that_somebody_needs_stay(before: str, after: str) -> None:
     assert install(spec_of(SCENES["arm"].replace(before, after))).tendon_num.tolist() == [6]
+
+
+def test_another_process_runs_the_callbacks_from_the_cache() -> None:
+    """Twice in a row, so that the second has nothing to compile; the data live until the process ends."""
+    code = (
+        f"import mujoco, mjwrap as mw; model = mw.load({str(ELBOW)!r}); data = mujoco.MjData(model); "
+        "mujoco.mj_step(model, data, nstep=20); print(data.qpos[0].hex())"
+    )
+    model = load(ELBOW)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=20)
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-X", "faulthandler", "-c", code], cwd=ROOT, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.split() == [data.qpos[0].hex()]
+        assert "compiling" not in done.stderr
