@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+import test_path_failures
 from declared_models import ARM, EXTENSOR, HILL, HOLDER, MUSCLE, ROW, declared, element
 from mujoco import batch, rollout
 from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, start
@@ -36,6 +37,7 @@ SCENES = {
     "elbow": ELBOW.read_text(),
     "arm": ARM.format(tendon=EXTENSOR, actuator=MUSCLE, custom="", option=""),
     "elastic arm": elastic_arm(),
+    "lost paths": test_path_failures.SCENE,  # a muscle that has no path for some of the time
 }
 
 
@@ -48,6 +50,9 @@ def moving(model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
     rng = np.random.default_rng(seed)
     data.qpos[:] += rng.uniform(0.0, 0.2, model.nq)
     data.qvel[:] = rng.uniform(-0.5, 0.5, model.nv)
+    if model.nplugin > 0:
+        for excitation in excitations(data).values():
+            excitation[:] = 0.6
     return data
 
 
@@ -71,8 +76,6 @@ def test_mj_step_moves_as_muscle_system_does(scene: str, integrator: int) -> Non
     data, twin, muscles = moving(ours), moving(reference), mw.MuscleSystem(reference)
     twin.xfrc_applied[1] = data.xfrc_applied[1] = PUSH
     muscles.excitation[:] = 0.6
-    for excitation in excitations(data).values():
-        excitation[:] = 0.6
     strongest = 0.0
     for _ in range(150):
         excite(data)
@@ -84,6 +87,7 @@ def test_mj_step_moves_as_muscle_system_does(scene: str, integrator: int) -> Non
         np.testing.assert_array_equal(data.xfrc_applied, twin.xfrc_applied)
         strongest = max(strongest, muscles.tension.min())
     assert strongest > 1.0
+    assert bool(muscles.failures.any()) == (scene == "lost paths")
     result = read(data)
     assert result.names == muscles.names
     for name in ("length", "velocity", "tension", "activation", "fiber_length", "status", "failures"):
@@ -137,7 +141,7 @@ def test_runge_kutta_keeps_its_fourth_order() -> None:
 def test_the_bits_do_not_depend_on_who_steps(scene: str) -> None:
     """A loop, rollout and batch on one and two threads, environments in any order: all states are the same."""
     model = install(spec_of(SCENES[scene]))
-    nenv, nstep = 6, 40
+    nenv, nstep = 6, 120
     initial = np.stack([state_of(moving(model, seed)) for seed in range(nenv)])
     control = np.random.default_rng(1).uniform(0.0, 1.0, (nenv, nstep, model.nu))
     expected = np.empty((nenv, nstep, initial.shape[1]))
@@ -157,7 +161,8 @@ def test_the_bits_do_not_depend_on_who_steps(scene: str) -> None:
     starts = [moving(model, env) for env in range(nenv)]
     for threads in (1, 2):
         pool = batch.Batch(model, nenv, nthread=threads)
-        pool.qpos[:], pool.qvel[:] = [d.qpos for d in starts], [d.qvel for d in starts]
+        for name in ("qpos", "qvel", "plugin_state"):
+            getattr(pool, name)[:] = [getattr(data, name) for data in starts]
         recorded = pool.rollout(nstep, control, record=[int(STATE)])[int(STATE)]
         np.testing.assert_array_equal(recorded, expected)
 

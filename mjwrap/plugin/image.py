@@ -50,6 +50,7 @@ def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration])
         "status": np.zeros(n, dtype=np.int64),
         "failures": np.zeros(n, dtype=np.int64),
         "off": np.zeros(n, dtype=np.bool_),
+        "lost": np.zeros(n, dtype=np.bool_),
         "written": np.zeros(model.nbody, dtype=np.bool_),
         "clock": np.zeros(bk.CLOCK),
     }

@@ -248,6 +248,9 @@ def stage(block, model, data):
         _ints(block, bk.A_STATUS, (n,)),
         wrench,
     )
+    status, lost = _ints(block, bk.A_STATUS, (n,)), flags(block + word(block + 8 * bk.A_LOST), (n,))
+    for m in range(n):
+        lost[m] = status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _advance_into(block, data, state, wrench)
     clock[bk.ACTED] = 1.0
 
@@ -272,9 +275,9 @@ def finish(block, model, data):
         _floats(block, bk.A_OWN, (n, 2)),
     )
     _exchange(block, state, True)
-    status, failures = _ints(block, bk.A_STATUS, (n,)), _ints(block, bk.A_FAILURES, (n,))
+    lost, failures = flags(block + word(block + 8 * bk.A_LOST), (n,)), _ints(block, bk.A_FAILURES, (n,))
     for m in range(n):
-        if status[m] != lay.CONVERGED:
+        if lost[m]:
             failures[m] += 1
 
 
