@@ -366,3 +366,9 @@ def test_another_process_runs_the_callbacks_from_the_cache() -> None:
         assert done.returncode == 0, done.stderr
         assert done.stdout.split() == [data.qpos[0].hex()]
         assert "compiling" not in done.stderr
+
+
+def test_an_installed_model_has_no_muscle_system() -> None:
+    model = mw.install(mujoco.MjSpec.from_file(str(ELBOW)))
+    with pytest.raises(mw.ModelError, match="engine plugin drives the muscles"):
+        mw.MuscleSystem(model)

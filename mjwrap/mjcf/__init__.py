@@ -7,7 +7,7 @@ whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing
 from mjwrap.mjcf.actuators import keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.files import read_model
-from mjwrap.mjcf.names import name_of, names
+from mjwrap.mjcf.names import has_plugin, name_of, names
 from mjwrap.mjcf.reader import read_declarations
 from mjwrap.mjcf.writing import set_laws
 
@@ -16,6 +16,7 @@ __all__ = [
     "MuscleDeclaration",
     "Node",
     "Route",
+    "has_plugin",
     "keeps_state",
     "name_of",
     "names",

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 import mujoco
 
+PLUGIN_INSTANCE = "mjwrap"  # of the engine plugin, behind the prefix of the model that it was attached with
+
 
 def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
     """Return an object's name, or #id where it has none."""
@@ -20,3 +22,9 @@ def names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> list[str]:
 def listed(found: Iterable[str]) -> str:
     """Return names for a message: separated by commas, "none" where there are none."""
     return ", ".join(found) or "none"
+
+
+def has_plugin(model: mujoco.MjModel) -> bool:
+    """Return whether mjwrap's engine plugin drives the muscles of a model."""
+    kind = mujoco.mjtObj.mjOBJ_PLUGIN
+    return any(name_of(model, kind, i).endswith(PLUGIN_INSTANCE) for i in range(model.nplugin))

@@ -21,6 +21,7 @@ import mujoco
 
 from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf import MuscleDeclaration, read_declarations
+from mjwrap.mjcf.names import PLUGIN_INSTANCE as INSTANCE
 from mjwrap.plan import Plan, build_plan
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries, compile_hooks
 from mjwrap.plugin.fingerprint import fingerprint
@@ -31,7 +32,6 @@ from mjwrap.plugin.placeholders import restore_placeholders
 from mjwrap.takeover import Takeover
 
 NAME = "mjwrap.muscles"
-INSTANCE = "mjwrap"  # name of an instance, behind the prefix of the model that it was attached with
 MUSCLES, NUMBERS = "muscles", "numbers"  # its configuration
 _PROBE = "mjwrap.probe"
 _PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC

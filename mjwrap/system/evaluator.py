@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels import evaluation, readiness
-from mjwrap.mjcf import read_declarations
+from mjwrap.mjcf import has_plugin, read_declarations
 from mjwrap.paths import Status
 from mjwrap.plan import build_plan
 from mjwrap.system.checks import check_state, ends_inside
@@ -28,6 +28,11 @@ class Evaluator(Results):
         if not isinstance(model, mujoco.MjModel):
             raise ModelError(
                 f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
+            )
+        if has_plugin(model):
+            raise ModelError(
+                "mjwrap's engine plugin drives the muscles of this model already (install): mj_step moves it, and "
+                "mjwrap.plugin.read(data) reads it; for a MuscleSystem compile a spec without the plugin"
             )
         self.model = model
         self.strict = strict
