@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from mjwrap.muscles import Law
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MuscleTrial:
     """A muscle's history, (T,) each: time [s], length and fiber_length [m], activation [-], tension [N].
 
@@ -50,20 +51,27 @@ def simulate_muscle(
     time (T,): increasing [s]; length: (T,) or one number [m]; either excitation, held from each time to the next, with
     `dynamics` and `initial_activation`, or activation, (T,) or one number each. velocity (T,) [m/s]: lengthening speed;
     None: central differences of length. An elastic tendon takes one implicit step from each time to
-    the next, from initial_fiber_length [m], or from static equilibrium. `StateError` for arrays that do not fit.
+    the next, from initial_fiber_length [m], or from static equilibrium. `StateError` for arrays that do
+    not fit, and for numbers that are not finite or not in their range.
     """
-    t = np.ascontiguousarray(time, dtype=np.float64)
+    t = np.array(time, dtype=np.float64)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
         raise StateError("time must be a list of finite, increasing numbers [s]")
     if (excitation is None) == (activation is None):
         raise StateError("give either an excitation or an activation")
     lengths = _column("length", length, t.size)
+    if not (lengths > 0.0).all():
+        raise StateError("length must be positive [m]")
+    if not 0.0 <= initial_activation <= 1.0:
+        raise StateError(f"initial_activation must be in [0, 1], not {initial_activation!r}")
+    if initial_fiber_length is not None and not (0.0 < initial_fiber_length < math.inf):
+        raise StateError(f"initial_fiber_length must be positive [m], not {initial_fiber_length!r}")
     drive = _column(
         "excitation" if activation is None else "activation", _either(excitation, activation), t.size
     )
     speeds = _rates(lengths, t) if velocity is None else _column("velocity", velocity, t.size)
     states, fibers, tension = np.zeros((3, t.size))
-    states[0] = min(max(initial_activation, 0.0), 1.0)
+    states[0] = initial_activation
     fibers[0] = kernels.NO_FIBER if initial_fiber_length is None else initial_fiber_length
     counts = np.zeros((t.size, 2), dtype=np.int64)
     params = np.zeros((1, PARAMS))

@@ -317,3 +317,95 @@ def test_the_excitation_of_a_native_muscle_reaches_its_metabolism() -> None:
         muscles.forward(data)
         heats.append(muscles.energetics(mw.Umberger2010()).activation_heat[0])
     assert heats[1] > 1.2 * heats[0]
+
+
+def pair(name: str, extra: str = "") -> str:
+    return MUSCLE.replace('name="extensor"', f'name="{name}" {extra}')
+
+
+def test_keyframes_keep_their_activations_when_a_fibre_length_comes_in() -> None:
+    key = '<keyframe><key name="k" act="0.3 0.9" ctrl="0.1 0.2"/></keyframe>'
+    xml = ARM.format(tendon=EXTENSOR, actuator=pair("a") + pair("b"), custom="", option="")
+    spec = mujoco.MjSpec.from_string(xml.replace("</mujoco>", key + "</mujoco>"))
+    mw.set_laws(spec, {"a": mw.DeGrooteFregly2016(*SIZES, tendon="elastic")})
+    mw.set_laws(spec, {"a": mw.Millard2012(*SIZES, tendon="elastic")})  # has its place by now
+    assert spec.compile().key_act.tolist() == [[0.3, 0.0, 0.9]]
+
+
+def test_time_constants_stay_when_the_law_is_replaced() -> None:
+    actuator = pair("a", 'timeconst="0.02 0.07"')
+    spec = mujoco.MjSpec.from_string(ARM.format(tendon=EXTENSOR, actuator=actuator, custom="", option=""))
+    for law in (mw.DeGrooteFregly2016(*SIZES, tendon="elastic"), mw.Millard2012(*SIZES)):
+        mw.set_laws(spec, {"a": law})
+        assert mw.MuscleSystem(spec.compile()).declarations[0].activation.row()[:2] == (0.02, 0.07)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "law", "words"),
+    [
+        (pair("a"), mw.PathActuator(3.0), "must be DeGrooteFregly2016 or Millard2012, not PathActuator"),
+        ('<muscle name="a" joint="elbow" lengthrange="-1 1"/>', None, "pulls no tendon"),
+        (pair("a", 'gear="-1"'), None, "not positive, so it pushes"),
+    ],
+)
+def test_a_law_that_a_muscle_cannot_have_changes_nothing(actuator: str, law: object, words: str) -> None:
+    spec = mujoco.MjSpec.from_string(ARM.format(tendon=EXTENSOR, actuator=actuator, custom="", option=""))
+    before = spec.to_xml()
+    laws: dict = {"a": law or mw.DeGrooteFregly2016(*SIZES, tendon="elastic")}
+    with pytest.raises(mw.ModelError, match=words):
+        mw.set_laws(spec, laws)
+    assert spec.to_xml() == before
+
+
+def test_what_does_not_pull_has_no_energetics() -> None:
+    model = elastic()
+    muscles, data = mw.MuscleSystem(model), start(model)
+    with pytest.raises(mw.StateError, match="call forward, apply or step first"):
+        muscles.energetics()
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    data.qvel[0] = 2.0
+    muscles.apply(data)
+    assert not data.xfrc_applied.any()
+    assert muscles.tension[0] == 0.0
+    assert muscles.energetics(mw.Umberger2010()).metabolic_power[0] == 0.0
+    assert muscles.energetics().muscle_power[0] == 0.0
+
+
+def test_states_advance_only_after_an_applied_step() -> None:
+    model = elastic()
+    muscles, data = mw.MuscleSystem(model), start(model)
+    with pytest.raises(mw.StateError, match="nothing to advance"):
+        muscles.advance(data)
+    muscles.step(data, nstep=3)
+    muscles.apply(data)
+    mujoco.mj_resetData(model, data)
+    with pytest.raises(mw.StateError, match="nothing to advance"):
+        muscles.advance(data)
+    assert not data.act.any()
+
+
+def test_excitations_of_another_shape_are_refused() -> None:
+    model = compiled(actuator="", custom=declared([element("tendon", "extensor")], HILL))
+    muscles = mw.MuscleSystem(model)
+    for wrong in (np.zeros(0), np.zeros(5), 0.5):
+        with pytest.raises(mw.StateError, match=r"shape \(1,\)"):
+            muscles.excitation = wrong  # pyright: ignore[reportAttributeAccessIssue]
+    muscles.excitation = np.array([0.4])
+    assert muscles.excitation[0] == 0.4
+
+
+def test_trials_refuse_what_is_no_muscle() -> None:
+    law, time = mw.DeGrooteFregly2016(*SIZES, tendon="elastic"), np.linspace(0.0, 0.1, 11)
+    for given in (
+        {"initial_fiber_length": math.nan},
+        {"initial_fiber_length": -1.0},
+        {"initial_activation": math.nan},
+        {"length": -0.4},
+        {"time": 0.3},
+    ):
+        values: dict = {"time": time, "length": 0.42} | given
+        with pytest.raises(mw.StateError):
+            mw.simulate_muscle(law, values.pop("time"), values.pop("length"), excitation=0.5, **values)
+    one = mw.simulate_muscle(law, [0.0], 0.42, activation=0.5)
+    assert one.tension[0] > 1.0
+    assert one.fiber_length[0] > 0.05

@@ -127,11 +127,14 @@ def hill_from_mujoco(
 ) -> HillFit:
     """Return MuJoCo's muscle as a Hill-type one, whose lengths are those of the tendon, without gear.
 
-    F_max: `force`, or scale/acc0 where that is negative, times gear; fibre: over the actuator's length range from
-    range[0] to range[1]; vmax in the same metres per second. A negative implied tendon length is mended as
+    F_max: `force`, or scale/acc0 where that is negative, times gear, over the cosine of the pennation angle, so that
+    the tension at optimal length is MuJoCo's; fibre: over the actuator's length range from range[0] to range[1]; vmax
+    in the same metres per second. A negative implied tendon length is mended as
     `fit_fiber_and_slack` does. The curves themselves differ. fiber_damping, tendon: those of `DeGrooteFregly2016`.
     `ModelError` where a parameter is not possible.
     """
+    if law.prm[2] < 0.0 and not law.acc0 > 0.0:
+        raise ModelError(f"force is to be scale/acc0, but acc0 is {law.acc0!r}")
     short, long = law.length_range
     optimal = (long - short) / (law.prm[1] - law.prm[0]) / law.gear
     fiber = fit_fiber_and_slack(
@@ -149,7 +152,7 @@ def hill_from_mujoco(
             f"the actuator's force range limits its tension to {least:.4g} N; the Hill-type muscle's is not",
         )
     muscle = DeGrooteFregly2016(
-        max_isometric_force=peak,
+        max_isometric_force=peak / math.cos(fiber.pennation_angle),
         optimal_fiber_length=fiber.optimal_fiber_length,
         tendon_slack_length=fiber.tendon_slack_length,
         pennation_angle=fiber.pennation_angle,

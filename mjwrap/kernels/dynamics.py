@@ -12,7 +12,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.activation import advance, rate
-from mjwrap.kernels.fiber import ELASTIC, equilibrium, rigid_fiber, step_fiber, tendon_force
+from mjwrap.kernels.fiber import ELASTIC, LEAST, equilibrium, rigid_fiber, step_fiber, tendon_force
 from mjwrap.kernels.muscle import DEGROOTE_FREGLY, MILLARD
 from mjwrap.kernels.muscle import tension as law_tension
 
@@ -100,6 +100,7 @@ def drive_muscles(
         else:
             if start_fiber[m] <= NO_FIBER:
                 start_fiber[m] = equilibrium(law[m], params, m, start_activation[m], length[m])[0]
+            start_fiber[m] = max(start_fiber[m], params[m, LEAST])
             fiber[m] = start_fiber[m]
             next_fiber[m] = start_fiber[m]
             if off[m] or duration <= 0.0:

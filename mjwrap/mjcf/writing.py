@@ -21,6 +21,7 @@ from mjwrap.mjcf.parameters import (
     TEXTS,
     TIMES,
 )
+from mjwrap.mjcf.surfaces import SIZES
 from mjwrap.muscles import DeGrooteFregly2016, Millard2012
 
 OBJ = mujoco.mjtObj
@@ -35,8 +36,10 @@ def set_laws(
     The spec is changed in place and compiles in MuJoCo without mjwrap. A muscle that a tuple declares keeps its route
     and gets the new law; a native one gets a tuple. Where the law has an elastic tendon, or `dynamics` are given,
     mjwrap integrates the states: the actuator becomes `dyntype="user" actdim="2"`, keeps control and control range and
-    pulls nothing without mjwrap; the time constants of a native muscle go with it unless `dynamics` replace them.
-    `ModelError` for a name that no muscle has, before anything is changed.
+    pulls nothing without mjwrap; the time constants of a native muscle go with it unless `dynamics` replace them
+    (MuJoCo's smoothing between them and a force range of the actuator do not), and keyframes get a fibre length of 0.
+    `ModelError` for a name that no muscle has, for an actuator that pulls no tendon or pushes, and for what is no law
+    with a fibre, before anything is changed.
     """
     actuators = {actuator.name: actuator for actuator in spec.actuators}
     tuples = {entry.name: entry for entry in spec.tuples if "mjwrap" in entry.name}
@@ -48,6 +51,14 @@ def set_laws(
             f"no muscle {listed(unknown)}; actuators: {listed(actuators)}; tuples: {listed(free)}"
         )
     for name, law in laws.items():
+        _check(name, law, actuators.get(name), by_actuator.get(name))
+    held = [
+        a
+        for name, law in laws.items()
+        if (law.states == 2 or dynamics is not None) and (a := actuators.get(name))
+    ]
+    _make_room(spec, held)
+    for name, law in laws.items():
         chosen = dynamics
         actuator = actuators.get(name)
         if actuator is not None and (law.states == 2 or dynamics is not None):
@@ -58,6 +69,44 @@ def set_laws(
             entry = spec.add_tuple(name=_fresh(f"mjwrap_{name}", tuples))
             _set_elements(entry, [(OBJ.mjOBJ_ACTUATOR, name, 0.0)])
         _write(spec, entry, name, law, chosen)
+
+
+def _check(name: str, law: object, actuator: Any, entry: Any) -> None:
+    """Raise `ModelError` where a muscle cannot have a law."""
+    if not isinstance(law, DeGrooteFregly2016 | Millard2012):
+        kinds = "DeGrooteFregly2016 or Millard2012"
+        raise ModelError(f"muscle '{name}': its law must be {kinds}, not {type(law).__name__}")
+    mixed = [key for key in (*NUMERICS, *SIZES) if key in name]
+    if mixed:
+        raise ModelError(
+            f"muscle '{name}': its name contains '{mixed[0]}', by which a numeric would be recognised"
+        )
+    if actuator is None:
+        return
+    stops = entry is not None and any(kind == OBJ.mjOBJ_SITE for kind, _, _ in _elements(entry))
+    if actuator.trntype != mujoco.mjtTrn.mjTRN_TENDON and not stops:
+        raise ModelError(f"muscle '{name}': its actuator pulls no tendon, and no tuple lists sites for it")
+    if actuator.gear[0] <= 0.0:
+        raise ModelError(f"muscle '{name}': the gear of its actuator is not positive, so it pushes")
+
+
+def _make_room(spec: mujoco.MjSpec, holders: list[Any]) -> None:
+    """Put a fibre length of 0 behind the activation of actuators in every keyframe that has activations."""
+    keys = [key for key in spec.keys if len(key.act)]
+    if not keys or not holders:
+        return
+    model = spec.copy().compile()
+    new = {actuator.name for actuator in holders}
+    for key in keys:
+        found: list[float] = []
+        before = [float(a) for a in key.act]
+        for i in range(model.nactuator):
+            first, count = int(model.actuator_actadr[i]), int(model.actuator_actnum[i])
+            kept = before[first : first + count] if count else []
+            if model.actuator(i).name in new and count < 2:
+                kept = [*kept, 0.0] if kept else [0.0, 0.0]
+            found += kept
+        key.act = found
 
 
 def _elements(entry: Any) -> list[tuple[mujoco.mjtObj, str, float]]:
@@ -98,11 +147,11 @@ def _hold_states(actuator: Any) -> None:
         prm[:] = 0.0
 
 
-def _is_parameter(kind: mujoco.mjtObj, name: str) -> bool:
-    """Return whether an element says which law a muscle has, rather than where it runs."""
-    if kind == OBJ.mjOBJ_NUMERIC:
-        return any(key in name for key in NUMERICS)
-    return kind == OBJ.mjOBJ_TEXT and any(key in name for key in TEXTS)
+def _is_parameter(kind: mujoco.mjtObj, name: str, keep: tuple[str, ...]) -> bool:
+    """Return whether an element says which law a muscle has, rather than where it runs, or what is to be kept."""
+    if kind not in (OBJ.mjOBJ_NUMERIC, OBJ.mjOBJ_TEXT) or any(key in name for key in keep):
+        return False
+    return any(key in name for key in (NUMERICS if kind == OBJ.mjOBJ_NUMERIC else TEXTS))
 
 
 def _write(
@@ -116,7 +165,8 @@ def _write(
         up, down, smoothing = dynamics.row()
         numerics |= {TIMES: [up, down], SMOOTHING: [smoothing]}
         texts[DYNAMICS] = dynamics.dynamics
-    elements = [e for e in _elements(entry) if not _is_parameter(e[0], e[1])]
+    keep = (TIMES, SMOOTHING, DYNAMICS) if dynamics is None else ()
+    elements = [e for e in _elements(entry) if not _is_parameter(e[0], e[1], keep)]
     known = {n.name: n for n in spec.numerics} | {t.name: t for t in spec.texts}
     for key, values in numerics.items():
         name = f"mjwrap_{muscle}_{key}"

@@ -6,7 +6,7 @@ import weakref
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels import evaluation, readiness
@@ -18,6 +18,7 @@ from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
 from mjwrap.takeover import Takeover
 
+_DISABLE_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 TOLERANCE = 1e-10  # largest tangency error of a path
 
 
@@ -44,12 +45,25 @@ class Evaluator(Results):
         self._states: dict[int, State] = {}
         self._groups_off = 0
         self._off = np.zeros(self._plan.n, dtype=np.bool_)
-        self.excitation: Array = np.zeros(self._plan.n)
+        self._excitation: Array = np.zeros(self._plan.n)
         self._root = np.asarray(model.body_rootid, dtype=np.int64)
         self._parent = np.asarray(model.body_parentid, dtype=np.int64)
         self._dofs = tuple(
             np.asarray(a, dtype=np.int64) for a in (model.body_dofadr, model.body_dofnum, model.dof_parentid)
         )
+
+    @property
+    def excitation(self) -> Array:
+        """Excitations (n,) of muscles without an actuator: set single ones, or all; `StateError` for another shape."""
+        return self._excitation
+
+    @excitation.setter
+    def excitation(self, values: ArrayLike) -> None:
+        given = np.asarray(values, dtype=np.float64)
+        if given.shape != self._excitation.shape:
+            wanted = self._excitation.shape
+            raise StateError(f"excitation must have shape {wanted}, one for each muscle, not {given.shape}")
+        self._excitation[:] = given
 
     def _state(self, data: mujoco.MjData) -> State:
         if self._takeover.lost():
@@ -69,11 +83,11 @@ class Evaluator(Results):
     def _check(self, data: mujoco.MjData) -> None:
         """Raise `StateError` naming what is not finite."""
         if readiness.all_finite(
-            data.qpos, data.qvel, data.act, data.ctrl, data.mocap_pos, data.mocap_quat, self.excitation
+            data.qpos, data.qvel, data.act, data.ctrl, data.mocap_pos, data.mocap_quat, self._excitation
         ):
             return
         check_state(self.model, data)
-        bad = readiness.first_bad(self.excitation)
+        bad = readiness.first_bad(self._excitation)
         raise StateError(f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s")
 
     def _evaluate(
@@ -89,7 +103,7 @@ class Evaluator(Results):
             plan.source, plan.index, plan.control, plan.ctrl_low, plan.ctrl_high, plan.form, plan.times,
             self._disabled(), self._root,
             poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos,
-            data.act, data.ctrl, state.own, self.excitation, since, ahead, TOLERANCE,
+            data.act, data.ctrl, state.own, self._excitation, since, ahead, TOLERANCE,
             state.node, state.segments, state.count, state.info,
             state.drive, state.start_activation, state.start_fiber, state.start_length,
             state.activation, state.fiber,
@@ -97,18 +111,21 @@ class Evaluator(Results):
             state.status, state.wrench,
         )  # fmt: skip
         self._last = state
-        state.time = data.time
+        state.time, state.evaluated = data.time, True
         state.in_scratch = poses is state.scratch
         if failed:
             self._failed(state, poses, data)
 
     def _disabled(self) -> NDArray[np.bool_]:
-        """Return which muscles (n,) belong to an actuator group that the model's options switch off."""
-        off = int(self.model.opt.disableactuator)
+        """Return which muscles (n,) the model's options switch off: all, or those of an actuator group."""
+        everything = bool(int(self.model.opt.disableflags) & _DISABLE_ACTUATION)
+        off = -1 if everything else int(self.model.opt.disableactuator)
         if off != self._groups_off:
             actuators = [muscle.actuator for muscle in self.declarations]
             groups = [int(self.model.actuator_group[a]) if a >= 0 else -1 for a in actuators]
-            self._off = np.array([group >= 0 and bool(off >> group & 1) for group in groups], dtype=np.bool_)
+            self._off = np.array(
+                [everything or (g >= 0 and bool(off >> g & 1)) for g in groups], dtype=np.bool_
+            )
             self._groups_off = off
         return self._off
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from mjwrap.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.errors import StateError
 from mjwrap.kernels import coupling, dynamics, layout
+from mjwrap.kernels.muscle import PATH_ACTUATOR
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
 from mjwrap.system.derivatives import length_jacobian_rate
@@ -23,7 +24,6 @@ from mjwrap.system.results import Array
 from mjwrap.system.state import State
 
 _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
-_DISABLE_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 
 
 class MuscleSystem(Evaluator):
@@ -64,6 +64,7 @@ class MuscleSystem(Evaluator):
         """
         state = self._state(data)
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
+        state.applied = data.time
         state.failures += state.status != 0
         coupling.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
 
@@ -71,12 +72,17 @@ class MuscleSystem(Evaluator):
         """Bring the states that mjwrap integrates itself to the end of the step for which `apply` put its forces in.
 
         For a loop of `apply`, `mj_step`, `advance`; `step` does all three. They are the activation and fibre length in
-        `data.act` of actuators with dyntype="user" actdim="2", and those of muscles without an actuator.
+        `data.act` of actuators with dyntype="user" actdim="2", and those of muscles without an actuator. `StateError`
+        where no step follows an `apply`.
         """
-        self._store(self._state(data), data)
+        state = self._state(data)
+        if state.applied is None or not data.time > state.applied:
+            raise StateError("nothing to advance: call apply, then mj_step, then advance")
+        self._store(state, data)
 
     def _store(self, state: State, data: mujoco.MjData) -> None:
         plan = self._plan
+        state.applied = None
         dynamics.write_states(
             plan.source, plan.index, state.next_activation, state.next_fiber, data.act, state.own
         )
@@ -106,13 +112,18 @@ class MuscleSystem(Evaluator):
     ) -> Energetics:
         """Return powers, stored energies and, with `metabolism`, metabolic cost of all muscles at the last evaluation.
 
-        metabolism: one model for all muscles, or one each. With an elastic tendon they are those of the state there,
+        metabolism: one model for all muscles, or one each. Muscles without a path there, and those switched off, have
+        zeros; `StateError` before the first evaluation. With an elastic tendon they are those of the state there,
         whose tendon force the `tension` of a step, which is the one at its end, leaves by the first order of the step.
         """
         plan, state = self._plan, self._last
+        if not state.evaluated:
+            raise StateError("no muscle has been evaluated yet: call forward, apply or step first")
+        idle = (state.status != 0) | self._disabled()
+        constants = metabolic_constants(metabolism, plan.law, plan.params)
         return compute_energetics(
-            plan.law, plan.params, state.activation, state.drive, state.length, state.velocity, state.fiber,
-            metabolic_constants(metabolism, plan.law, plan.params),
+            np.where(idle, PATH_ACTUATOR, plan.law), plan.params, np.where(idle, 0.0, state.activation), state.drive,
+            state.length, np.where(idle, 0.0, state.velocity), state.fiber, constants,
         )  # fmt: skip
 
     # -------------------------------------------------------------------------------------- stepping
@@ -128,7 +139,6 @@ class MuscleSystem(Evaluator):
         state = self._state(data)
         before = resets(data)
         runge_kutta = int(self.model.opt.integrator) == _RK4
-        silent = bool(int(self.model.opt.disableflags) & _DISABLE_ACTUATION)
         try:
             if runge_kutta:
                 self._step_stages(state, data, nstep)
@@ -136,12 +146,11 @@ class MuscleSystem(Evaluator):
                 for _ in range(nstep):
                     self._check(data)
                     mujoco.mj_step1(self.model, data)
-                    if not silent:
-                        self._act(state, data, ahead=self.model.opt.timestep)
-                        state.failures += state.status != 0
+                    self._act(state, data, ahead=self.model.opt.timestep)
+                    state.failures += state.status != 0
                     mujoco.mj_step2(self.model, data)
                     self._take_back(state, data)
-                    if self._plan.integrates and not silent and resets(data) == before:
+                    if self._plan.integrates and resets(data) == before:
                         self._store(state, data)
         finally:
             self._take_back(state, data)

@@ -34,6 +34,8 @@ class State:
         self.written = np.zeros(model.nbody, dtype=np.bool_)
         self.scratch = mujoco.MjData(model)
         self.time = 0.0
+        self.evaluated = False
+        self.applied: float | None = None  # time of an `apply` whose states are still to be advanced
         self.in_scratch = False  # whether the last evaluation read its poses there, or in the caller's data
 
     def forget(self) -> None:
@@ -44,3 +46,4 @@ class State:
             array[:] = 0.0
         self.status[:] = 0
         self.failures[:] = 0
+        self.evaluated, self.applied = False, None
