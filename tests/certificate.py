@@ -25,6 +25,7 @@ SUM = 1e-13  # relative: total length against the sum of its parts
 ENTERING = 1e-12  # depth of a straight segment below a surface [m]
 LIFTING = 1e-9  # negative normal curvature, as a share of the largest
 SLIPPING = 1e-9  # negative stiffness against sideways shifts, as a share of the largest
+SHORT = 1e-6  # a segment this short has a direction that may miss over an arc [m]
 ROUNDING = 1e-15  # of a point [m]: a segment this short has no direction
 SEGMENT_SAMPLES = 257  # along a straight segment beside a surface that is not convex
 NARROWING = 60  # golden-section steps between two samples
@@ -166,6 +167,13 @@ def laid_out(number: int, case: Case) -> tuple[list[Touch], list[tuple[int, int,
     return touches, chords, total
 
 
+def _tangent(n: Array, e: Array) -> Array:
+    """Return unit tangents (m, 3) along directions, or any where these are near the normals (m, 3)."""
+    t = e - (e * n).sum(1)[:, None] * n
+    size = np.linalg.norm(t, axis=1)
+    return np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], beside(n))
+
+
 def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
     """Return the touches by kind of surface, with the geodesics that arriving segments continue in; fill in frames."""
     kinds: dict[type, list[Touch]] = {}
@@ -190,9 +198,12 @@ def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
         # a segment too short to have a direction hands over to the one behind an arc too short to turn
         blunt = np.array([touch.before < 1e3 * ROUNDING for touch in found])
         e = np.where(blunt[:, None], e2, e)
-        t = e - (e * n).sum(1)[:, None] * n
-        size = np.linalg.norm(t, axis=1)
-        t = np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], beside(n))
+        t = _tangent(n, e)
+        # a short segment's direction is sure to its rounding only: a longer one behind says where the arc comes from
+        short = np.array([touch.before < min(SHORT, touch.after) for touch in found]) & (~blunt | (s > SHORT))
+        if short.any():
+            start = -_tangent(shape.normal(d[short], Q[short]), e2[short])
+            t[short] = _tangent(n[short], -arcs_of(shape, d[short], Q[short], start, s[short]).t)
         arcs = arcs_of(shape, d, P, t, s)
         ends = shape.normal(d, arcs.Q)
         for k, touch in enumerate(found):

@@ -180,6 +180,24 @@ def test_a_path_made_from_a_geodesic_stands(letter: str) -> None:
     assert findings(cases) == [""] * CASES
 
 
+def test_a_path_that_begins_beside_its_surface_stands(letter: str) -> None:
+    """The direction of its first segment is known to no more than its rounding: 1e-3 rad of 1e-12 m.
+
+    A bend where the arc is left, or an arc that ends elsewhere, is found all the same.
+    """
+    rng = np.random.default_rng(19)
+    for first in (1e-9, 1e-10, 1e-12):
+        for _ in range(CASES):
+            case = grazing(rng, letter)
+            P, Q, s = touch(case)
+            near = replace(case, origin=P + first * unit(case.origin - P))
+            assert reason(moved(near, (P, Q, s))) == ""
+            assert reason(moved(near, (P, Q, s * (1.0 + 1e-5)))).startswith("no geodesic")
+            aside = np.cross(case.insertion - Q, rng.normal(size=3))
+            bent = replace(near, insertion=case.insertion + 1e-3 * aside)
+            assert reason(moved(bent, (P, Q, s))).startswith(("no geodesic", "not tangent"))
+
+
 def test_a_folded_path_is_refuted(letter: str) -> None:
     """The string arrives from the other side and turns back: tangent, but against its own direction."""
     rng = np.random.default_rng(5)
