@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from itertools import pairwise
 
 import numpy as np
@@ -39,38 +40,27 @@ def landing(rng: np.random.Generator, letter: str) -> tuple[Array, Array, Array,
     return foot[0], outward(obstacle, foot)[0], insertion, obstacle
 
 
-NEAR_A_TORUS = (
-    "a known limit (docs/limits.md): beside a torus that the path leaves at once the search can fail"
-)
-LANDINGS = [
-    pytest.param(
-        letter,
-        warm,
-        id=f"{NAMES[letter]}-{'warm' if warm else 'cold'}",
-        marks=[pytest.mark.xfail(strict=True, reason=NEAR_A_TORUS)] * (letter == "t" and not warm),
-    )
-    for letter in LETTERS
-    for warm in (False, True)
-]
-
-
-@pytest.mark.parametrize(("letter", "warm"), LANDINGS)
-def test_an_end_point_that_comes_to_lie_on_a_surface_has_a_path(letter: str, warm: bool) -> None:
+@both_starts
+@pytest.mark.parametrize("last", [False, True], ids=["origin", "insertion"])
+@every_surface
+def test_an_end_point_that_comes_to_lie_on_a_surface_has_a_path(letter: str, last: bool, warm: bool) -> None:
     """Lengths change by no more than the end moves: the shortest path, and one that stays on its branch, do so.
 
     A first segment shorter than PINNED has no direction that the certificate could tell.
     """
     rng = np.random.default_rng(31)
     for _ in range(15):
-        foot, normal, insertion, obstacle = landing(rng, letter)
+        foot, normal, other, obstacle = landing(rng, letter)
         sols: list[mw.PathSolution] = []
         for distance in ABOVE:
             end = foot + distance * normal
-            sols.append(mw.solve_path(end, insertion, [obstacle], start=sols[-1] if warm and sols else None))
+            ends = (other, end) if last else (end, other)
+            sols.append(mw.solve_path(*ends, [obstacle], start=sols[-1] if warm and sols else None))
             assert sols[-1].converged
-            contact = sols[-1].contacts[0].P
+            touch = sols[-1].contacts[0]
+            contact = (touch.second or touch).Q if last else touch.P
             if contact is None or np.linalg.norm(contact - end) > PINNED:
-                check_path(end, insertion, [obstacle], sols[-1])
+                check_path(*ends, [obstacle], sols[-1])
         for (above, below), (before, after) in zip(pairwise(ABOVE), pairwise(sols), strict=True):
             assert abs(after.length - before.length) <= above - below + 1e-12
 
@@ -115,7 +105,10 @@ def cut(surface: mw.Surface, half: float) -> mw.Surface:
 
 @pytest.mark.parametrize("letter", "clk", ids=NAMES.__getitem__)
 def test_a_contact_beyond_the_end_of_a_surface_has_a_status(letter: str) -> None:
-    """The path is that of the unbounded surface, exactly; beyond the end at any point of the geodesic it is named."""
+    """The path is that of the unbounded surface, exactly; beyond the end at any point of the geodesic it is named.
+
+    At a cold start a way round that keeps within the ends is taken instead, where there is one.
+    """
     rng = np.random.default_rng(32)
     inside = 0
     for _ in range(40):
@@ -130,10 +123,41 @@ def test_a_contact_beyond_the_end_of_a_surface_has_a_status(letter: str) -> None
             short = mw.Obstacle(cut(obstacle.surface, share * reach), obstacle.pos, obstacle.quat)
             for start in (None, whole):
                 sol = mw.solve_path(origin, insertion, [short], start=start)
+                if start is None and sol.converged and share < 1.0:
+                    assert sol.length > whole.length
+                    check_path(origin, insertion, [short], sol)
+                    continue
                 assert sol.length == pytest.approx(whole.length, rel=EXACT)
                 assert sol.status == (mw.Status.CONVERGED if share > 1.0 else mw.Status.OUT_OF_RANGE)
                 inside += share > 1.0
     assert inside > 40
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_without_a_hint_a_path_in_range_is_found_where_there_is_one(count: int) -> None:
+    """No hint leads to a path within the ends of all surfaces where none was found without; many are found so."""
+    rng = np.random.default_rng(41)
+    refused = rescued = 0
+    for _ in range(150):
+        origin, insertion, row = random_scene(rng, "".join(rng.choice(list("clk"), count)), hints=False)
+        ends = [
+            mw.Obstacle(cut(o.surface, half), o.pos, o.quat)
+            for o, half in zip(row, rng.uniform(0.005, 0.04, count), strict=True)
+        ]
+        sol = mw.solve_path(origin, insertion, ends)
+        whole = mw.solve_path(origin, insertion, row)
+        rescued += sol.converged and sol.length > whole.length * (1.0 + 1e-9)
+        if sol.status != mw.Status.OUT_OF_RANGE:
+            continue
+        refused += 1
+        for angles in itertools.product(np.arange(4) * 0.5 * np.pi, repeat=count):
+            hinted = [
+                mw.Obstacle(o.surface, o.pos, o.quat, (0.01 * np.cos(a), 0.01 * np.sin(a), 0.0))
+                for o, a in zip(ends, angles, strict=True)
+            ]
+            assert not mw.solve_path(origin, insertion, hinted).converged
+    assert refused > 5
+    assert rescued > 0
 
 
 # ------------------------------------------------------------------------------------- surfaces that equal others

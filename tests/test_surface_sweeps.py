@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scenes import LETTERS, Array, check_path, height, random_scene
-from test_surface_paths import EXACT, crossing, every_surface
+from test_surface_paths import EXACT, NAMES, crossing, every_surface
 
 import mjwrap as mw
 
@@ -115,7 +115,20 @@ def test_a_path_depends_on_nothing_but_its_pose_and_start(letter: str) -> None:
         assert sweep.length[0] == cold.length == sweep.length[2]
 
 
-@every_surface
+SLIDES_OFF = "a known limit (docs/limits.md): a minimum that ceases to exist in a row with a torus"
+
+
+@pytest.mark.parametrize(
+    "letter",
+    [
+        pytest.param(
+            letter,
+            id=NAMES[letter],
+            marks=[pytest.mark.xfail(strict=True, reason=SLIDES_OFF)] * (letter == "t"),
+        )
+        for letter in LETTERS
+    ],
+)
 def test_a_motion_forth_and_back_ends_where_it_began(letter: str) -> None:
     """Two surfaces, both touched all the time: same lengths on the way back."""
     rng = np.random.default_rng(44)

@@ -92,7 +92,9 @@ W_START = 138  # the saved solution from which a solve over a large move started
 W_LOW = 149  # height of the lowest point of a free string over the surface [m]
 W_FIRST = 150  # in a span's first row: ||f||^2 of the contacts from which it started; -1 where they are not evaluated
 W_REPAIRS = 151  # in a span's first row: how often the path was begun anew, from another start or in strides
-ROW = 152  # 19 cache lines
+W_PIN = 152  # 1 where Q is at the path's last point, which lies on the surface; 0 else
+W_LAND = 153  # 1 while Q is to go there, however far it is; 0 else
+ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
 I_LENGTH = 0

@@ -18,12 +18,14 @@ S_MODE, S_P, S_ARC = lay.S_MODE, lay.S_P, lay.S_ARC
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
 W_BP, W_BQ, W_KP, W_KQ, W_JAC = lay.W_BP, lay.W_BQ, lay.W_KP, lay.W_KQ, lay.W_JAC
 W_E, W_L, W_CP, W_CQ, W_LQ, W_EQ = lay.W_E, lay.W_L, lay.W_CP, lay.W_CQ, lay.W_LQ, lay.W_EQ
+W_PIN, W_LAND = lay.W_PIN, lay.W_LAND
 SIZE = lay.SIZE
 W_Y, W_X, W_SAVE = lay.W_Y, lay.W_X, lay.W_SAVE
 TOUCHED = lay.TOUCHED
 
 ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
-LAST = 2e-9  # the same at the path's last point, where nothing pins the contact
+SUNK = 2e-12  # an end point lower above the surface than this share of the size lies on it
+LANDED = 0.01  # Q so far off an end point on the surface, in its size, counts like a direction that is off by 1 rad
 PINNED = 1e-11  # a contact nearer than this share of the size to an end on the surface is at it
 CORNER = 1e-6  # half the angle between two contacts that meet, beyond which they do not go on into each other [rad]
 NOISE = 4e-16  # rounding of a point [m]: over a segment's length it bounds what its direction can say
@@ -49,26 +51,39 @@ def _dot(node, j, left, k, right):
 
 
 @jit
-def _leave(j, ex, ey, ez, size, ends, node):
-    """Enter the straight segment that leaves obstacle j; return its share of ||f||^2, none where the path ends
-    there.
+def _leave(j, ex, ey, ez, size, last, node):
+    """Enter the straight segment that leaves obstacle j, the path's last one or not; return its share of ||f||^2.
+
+    Where the path ends on the surface its share is that of the way from Q to its end.
     """
     node[j, W_EQ] = ex
     node[j, W_EQ + 1] = ey
     node[j, W_EQ + 2] = ez
     node[j, W_LQ] = size
-    if ends:
-        node[j, W_CQ] = 1.0
-        node[j, W_CQ + 1] = 0.0
-        node[j, W_CQ + 2] = 0.0
-        return 0.0
+    node[j, W_PIN] = 0.0
     along = _dot(node, j, W_EQ, j, W_TQ)
     normal = _dot(node, j, W_EQ, j, W_NQ)
     binormal = _dot(node, j, W_EQ, j, W_BQ)
+    if last and (node[j, W_LAND] != 0.0 or _on_surface(j, normal, size, node)):
+        node[j, W_PIN] = 1.0
+        node[j, W_CQ] = 0.0
+        node[j, W_CQ + 1] = -size * along
+        node[j, W_CQ + 2] = -size * binormal
+        share = size / (LANDED * node[j, SIZE])
+        return share * share * (along * along + binormal * binormal)
     node[j, W_CQ] = along
     node[j, W_CQ + 1] = normal
     node[j, W_CQ + 2] = binormal
     return _share(along, normal, binormal, size)
+
+
+@inlined
+def _on_surface(k, normal, size, node):
+    """Return whether a straight segment, `size` long, is none because the path ends there on obstacle k's surface.
+
+    normal: its direction's component along the surface's normal.
+    """
+    return size <= ON_SURFACE * node[k, SIZE] and size * abs(normal) <= SUNK * node[k, SIZE]
 
 
 @inlined
@@ -104,10 +119,9 @@ def _connect(lo, hi, ends, node):
             continue
         dx, dy, dz = node[k, W_P] - x, node[k, W_P + 1] - y, node[k, W_P + 2] - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
-        short = size <= ON_SURFACE * node[k, SIZE]
-        if (
-            short and last >= 0
-        ):  # two contacts meet: where they do not go on into each other there is a corner
+        meets = last >= 0 and size <= ON_SURFACE * node[k, SIZE]
+        if meets:
+            # two contacts meet: where they do not go on into each other there is a corner
             dx, dy, dz = (
                 node[last, W_TQ] + node[k, W_TP],
                 node[last, W_TQ + 1] + node[k, W_TP + 1],
@@ -121,17 +135,15 @@ def _connect(lo, hi, ends, node):
         node[k, W_E + 1] = dy
         node[k, W_E + 2] = dz
         node[k, W_L] = size
-        along, normal, binormal = 1.0, 0.0, 0.0
-        if last >= 0 or not short:
-            along = _dot(node, k, W_E, k, W_TP)
-            normal = _dot(node, k, W_E, k, W_NP)
-            binormal = _dot(node, k, W_E, k, W_BP)
+        along = _dot(node, k, W_E, k, W_TP)
+        normal = _dot(node, k, W_E, k, W_NP)
+        binormal = _dot(node, k, W_E, k, W_BP)
+        if last < 0 and _on_surface(k, normal, size, node):
+            along, normal, binormal = 1.0, 0.0, 0.0
         node[k, W_CP] = along
         node[k, W_CP + 1] = normal
         node[k, W_CP + 2] = binormal
-        corner = (
-            short and last >= 0 and (1.0 - along) ** 2 + normal * normal + binormal * binormal > CORNER**2
-        )
+        corner = meets and (1.0 - along) ** 2 + normal * normal + binormal * binormal > CORNER**2
         total += _share(along, normal, binormal, 1.0 if corner else size)
         if last >= 0:
             total += _leave(last, dx, dy, dz, size, False, node)
@@ -141,8 +153,7 @@ def _connect(lo, hi, ends, node):
         dx, dy, dz = bx - x, by - y, bz - z
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
         inverse = 1.0 / (size + SHORTEST)
-        short = size <= LAST * node[last, SIZE]
-        total += _leave(last, dx * inverse, dy * inverse, dz * inverse, size, short, node)
+        total += _leave(last, dx * inverse, dy * inverse, dz * inverse, size, True, node)
     return total
 
 
@@ -193,6 +204,8 @@ def step(lo, hi, node):
         bn = tau * cq + beta * h3 + h2 * h3 * over
         tb = -tau * h2 + h3 * cq * over
         bb = -beta * h2 - (1.0 - h3 * h3) * over
+        if node[k, W_PIN] != 0.0:  # h2, h3: how far Q is beyond the path's end, along t and b
+            tn, bn, tb, bb = 1.0, 0.0, 0.0, 1.0
         if m00 == 0.0 or c == 0.0:
             return False
         # eliminate: d0 = p0 + p1 d1, d2 = g0 + g1 d1, shift of Q along b = w0 + w1 d1, its rate = v0 + v1 d1
@@ -302,8 +315,8 @@ def _pin(lo, hi, ends, node):
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED:
             continue
-        size = node[k, SIZE]
-        if node[k, W_L] > ON_SURFACE * size or node[k, W_L] <= PINNED * size:
+        normal = _dot(node, k, W_E, k, W_NP)
+        if node[k, W_L] <= PINNED * node[k, SIZE] or not _on_surface(k, normal, node[k, W_L], node):
             return False
         x, y, z = into_frame(node, k, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5])
         x, y, z, _, _, _ = project(node, k, x, y, z)

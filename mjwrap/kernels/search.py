@@ -14,54 +14,23 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.certify import minimal, swept
+from mjwrap.kernels.beside import beside, moved_onto, polish, polish_beside, polish_landed, shoot
+from mjwrap.kernels.certify import swept
 from mjwrap.kernels.clearance import dip, tube_angle, tube_crossing
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.guess import across, guess, place, place_on_tube
-from mjwrap.kernels.newton import GEODESICS, UNKNOWN, newton
+from mjwrap.kernels.newton import GEODESICS, UNKNOWN
 from mjwrap.kernels.ruled import A_INSIDE, B_INSIDE, INSIDE, follow, set_free
-from mjwrap.kernels.shape import height, project, turn_into_frame
+from mjwrap.kernels.shape import project
 from mjwrap.kernels.stoermer import carray, stack
 
-KIND, DIM, SIZE, POS, ROT, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.ROT, lay.HINT
-S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
-W_P, W_Q = lay.W_P, lay.W_Q
+KIND, DIM, SIZE, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.HINT
+S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 DIRECTIONS = 12  # half planes around AB
-LOCAL_TOL = 1e-5  # tangency error of a single wrap: all of them are polished together
-LOCAL_STEPS = 15
 DEPTH = 1e-10  # a segment that dips less below a surface, in its size, is clear of it
 SAME_BRANCH = 1.0  # difference of swept angles [rad] that is no whole turn
-
-
-@jit
-def _polish(k, ends, node, known):
-    """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length.
-
-    known: what the row holds of its start, UNKNOWN or GEODESICS.
-    """
-    error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, known)
-    node[k, lay.W_FRESH] = error * error
-    if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and minimal(k, k + 1, node)):
-        return False, 0.0
-    return True, node[k, lay.W_L] + node[k, S_ARC] + node[k, lay.W_LQ]
-
-
-@jit
-def _clamped(k, node, ends, column):
-    """Return an end of the string, moved onto the surface where it lies inside, in S and relative to the base."""
-    x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
-    px, py, pz = turn_into_frame(node, k, ends[column] - x, ends[column + 1] - y, ends[column + 2] - z)
-    if height(node, k, px, py, pz) >= (INSIDE - 1.0) * node[k, SIZE]:
-        return False, px, py, pz, ends[column], ends[column + 1], ends[column + 2]
-    px, py, pz, _, _, _ = project(node, k, px, py, pz)
-    return (
-        True, px, py, pz,
-        x + node[k, ROT] * px + node[k, ROT + 1] * py + node[k, ROT + 2] * pz,
-        y + node[k, ROT + 3] * px + node[k, ROT + 4] * py + node[k, ROT + 5] * pz,
-        z + node[k, ROT + 6] * px + node[k, ROT + 7] * py + node[k, ROT + 8] * pz,
-    )  # fmt: skip
 
 
 @jit
@@ -100,9 +69,14 @@ def wrap_searched(k, ends, node, search):
 
     Without `search` a contact that Newton's method does not find again stays where it was.
     """
-    in_a, ax, ay, az, qx, qy, qz = _clamped(k, node, ends, 3)
-    in_b, bx, by, bz, rx, ry, rz = _clamped(k, node, ends, 6)
-    inside = (A_INSIDE if in_a else 0) + (B_INSIDE if in_b else 0)
+    high_a, ax, ay, az, qx, qy, qz = moved_onto(k, node, ends, 3, False)
+    high_b, bx, by, bz, rx, ry, rz = moved_onto(k, node, ends, 6, False)
+    low = (INSIDE - 1.0) * node[k, SIZE]
+    inside = (A_INSIDE if high_a < low else 0) + (B_INSIDE if high_b < low else 0)
+    if node[k, lay.TWIN] != 0.0:  # the string comes from the surface itself
+        high_a = math.inf
+    elif k + 1 < node.shape[0] and node[k + 1, lay.TWIN] != 0.0 and node[k + 1, S_MODE] == TOUCHED:
+        high_b = math.inf
     ends = (ends[0], ends[1], ends[2], qx, qy, qz, rx, ry, rz)
     mode, before = node[k, S_MODE], node[k, S_SWEEP]
     winds = node[k, KIND] == lay.TORUS and node[k, lay.TWIN] == 0.0
@@ -110,7 +84,7 @@ def wrap_searched(k, ends, node, search):
     if mode == TOUCHED:
         for i in range(lay.STATE):
             node[k, lay.W_LAST + i] = node[k, S_MODE + i]
-        good, _ = _polish(k, ends, node, GEODESICS if node[k, lay.W_FRESH] >= 0.0 else UNKNOWN)
+        good, _ = polish(k, ends, node, GEODESICS if node[k, lay.W_FRESH] >= 0.0 else UNKNOWN)
         if good and _on_branch(k, node, branch, before):
             node[k, S_SWEEP] = swept(k, node) if winds else 0.0
             return inside
@@ -123,7 +97,7 @@ def wrap_searched(k, ends, node, search):
     if low >= -DEPTH * node[k, SIZE] and not hooked:
         if hinted and node[k, KIND] >= lay.TORUS and node[k, KIND] != lay.CAPSULE:
             place(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
-            good, _ = _polish(k, ends, node, UNKNOWN)
+            good, _ = polish_beside(k, ends, node, high_a, high_b)
             if good:
                 node[k, S_SWEEP] = swept(k, node) if winds else 0.0
                 return inside
@@ -135,12 +109,17 @@ def wrap_searched(k, ends, node, search):
         geodesic(k, node, ends[0], ends[1], ends[2])
         return inside
     clear = low >= -DEPTH * node[k, SIZE]
-    _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before, clear)
+    _search(
+        k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before, clear,
+        high_a, high_b,
+    )  # fmt: skip
     return inside
 
 
 @jit
-def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, branch, before, clear):
+def _search(
+    k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, branch, before, clear, high_a, high_b
+):
     """Try half planes all round AB, the likeliest first; leave the best path, or the first guess where none holds."""
     ux, uy, uz = dx / size, dy / size, dz / size
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
@@ -188,7 +167,7 @@ def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, br
             guessed = True
             for i in range(lay.STATE):
                 memory[lay.STATE + i] = node[k, S_MODE + i]
-        good, total = _polish(k, ends, node, UNKNOWN)
+        good, total = polish_beside(k, ends, node, high_a, high_b)
         if not good or not _on_branch(k, node, branch, before) or (found and total >= best * (1.0 - 1e-12)):
             continue
         found, best, fresh = True, total, j
@@ -197,6 +176,25 @@ def _search(k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, br
             memory[i] = node[k, S_MODE + i]
         if hinted or not cold:
             break
+    if not found or (cold and not hinted):
+        ways = carray(stack(), (80,))
+        for side in range(2):
+            if (high_a if side == 0 else high_b) > beside(k, node):
+                continue
+            for i in range(shoot(k, ends, node, side, ways)):
+                good, total = polish_landed(k, ends, node, side, high_a, high_b, ways[2 * i], ways[2 * i + 1])
+                if (
+                    not good
+                    or not _on_branch(k, node, branch, before)
+                    or (found and total >= best * (1.0 - 1e-12))
+                ):
+                    continue
+                j += 1
+                found, best, fresh = True, total, j
+                node[k, S_SWEEP] = swept(k, node) if winds else 0.0
+                for c in range(lay.STATE):
+                    memory[c] = node[k, S_MODE + c]
+            j += 1
     node[k, S_MODE] = TOUCHED
     if found and fresh == j:
         return

@@ -16,9 +16,10 @@ from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.newton import GEODESICS, ON_SURFACE, UNKNOWN, newton
-from mjwrap.kernels.relax import path_length, relax, search_rows, shorten
+from mjwrap.kernels.relax import path_length, relax
 from mjwrap.kernels.shape import into_frame, project
-from mjwrap.kernels.touch import drop, follow_branch, in_range, join, split, take_in
+from mjwrap.kernels.sides import search_rows, shorten
+from mjwrap.kernels.touch import MEETING, MET, drop, follow_branch, in_range, join, split, take_in
 
 DIM, POS, ROT = lay.DIM, lay.POS, lay.ROT
 HINT, S_MODE, W_OLD, W_Y, W_FRESH = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Y, lay.W_FRESH
@@ -182,7 +183,7 @@ def settle(lo, hi, ends, node, tol, direct):
             evaluations += e
             good = error <= tol and follow_branch(lo, hi, node)
         if good and minimal(lo, hi, node):
-            dropped = drop(lo, hi, node) + join(lo, hi, ends, node)
+            dropped = drop(lo, hi, node) + join(lo, hi, ends, node, MET)
             added, status = take_in(lo, hi, ends, node)
             if dropped + added == 0:
                 settled = True
@@ -190,7 +191,7 @@ def settle(lo, hi, ends, node, tol, direct):
             changes += 1
             if changes <= hi - lo + CALM:
                 continue
-        elif good and split(lo, hi, ends, node) > 0:
+        elif (good and split(lo, hi, ends, node) > 0) or (not good and join(lo, hi, ends, node, MEETING) > 0):
             changes += 1
             if changes <= hi - lo + CALM:
                 continue

@@ -17,6 +17,7 @@ W_P, W_Q = lay.W_P, lay.W_Q
 FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
 MET = 1e-5  # contacts on both sides of a hollow that are so near, in the surface's size, have met
+MEETING = 1e-3  # the same where Newton's method fails: a segment that vanishes has no direction
 PIECES = 24  # of a geodesic, to find where it runs through a hollow
 DEPTH = (
     -1e-9
@@ -51,7 +52,7 @@ def follow_branch(lo, hi, node):
 
 
 @jit
-def _release(k, node):
+def release(k, node):
     """Let go of a contact; where the straight segment beside the surface runs is not known yet."""
     node[k, S_MODE] = FREE
     for i in range(7):
@@ -64,7 +65,7 @@ def drop(lo, hi, node):
     dropped = 0
     for k in range(lo, hi):
         if node[k, S_MODE] == TOUCHED and node[k, S_ARC] < 0.0:
-            _release(k, node)
+            release(k, node)
             dropped += 1
     return dropped
 
@@ -99,7 +100,7 @@ def _hand_over(k, node):
     """Move the contact of row k to its twin, the surface's second row."""
     for i in range(lay.STATE):
         node[k + 1, S_MODE + i] = node[k, S_MODE + i]
-    _release(k, node)
+    release(k, node)
 
 
 @jit
@@ -152,19 +153,22 @@ def split(lo, hi, ends, node):
 
 
 @jit
-def join(lo, hi, ends, node):
-    """Make one contact of two that have met, where the surface in between bears the string; return how many."""
+def join(lo, hi, ends, node, met):
+    """Make one contact of two that have met, where the surface in between bears the string; return how many.
+
+    met: largest distance between them, in the surface's size.
+    """
     count = 0
     for k in range(lo, hi - 1):
         if node[k, S_MODE] != TOUCHED or not _has_twin(k, hi, node) or node[k + 1, S_MODE] != TOUCHED:
             continue
-        if node[k, lay.W_LQ] > MET * node[k, SIZE]:
+        if node[k, lay.W_LQ] > met * node[k, SIZE]:
             continue
         arc = node[k, S_ARC]
         node[k, S_ARC] = arc + node[k, lay.W_LQ] + node[k + 1, S_ARC]
         geodesic(k, node, ends[0], ends[1], ends[2])
         if node[k, lay.W_KMIN] >= 0.0:
-            _release(k + 1, node)
+            release(k + 1, node)
             count += 1
         else:
             node[k, S_ARC] = arc
