@@ -147,13 +147,11 @@ def torus(k, node):
         if not doubt <= TOLERANCE:
             longest = abs(h) * min(max((0.1 * TOLERANCE / doubt) ** SHRINK, 0.2), 0.9)
             continue
-        crossed = (z >= 0.0) != (z1 >= 0.0) and rho + p1 < 2.0 * major
-        if crossed:
+        if (z >= 0.0) != (z1 >= 0.0) and rho + p1 < 2.0 * major:
             turns += 1.0 if (z >= 0.0) == (left > 0.0) else -1.0
-        if (
-            h * dp < 0.0 < h * dp1
-        ):  # nearest to the axis in between: in the hole's circle, or where it turns back (c)
-            nearest = major - minor if crossed else abs(c)
+        if h * dp < 0.0 < h * dp1:
+            # nearest to the axis in between: in the hole's circle, or where it turns back before (c)
+            nearest = max(major - minor, abs(c))
             straightest = min(straightest, (1.0 - c2 * major / nearest**3) * ir)
         rho, z, dp, dz, a, da, r, dr = p1, z1, dp1, dz1, a1, da1, r1, dr1
         angle += part
