@@ -78,12 +78,13 @@ def _leave(j, ex, ey, ez, size, last, node):
 
 
 @inlined
-def _on_surface(k, normal, size, node):
+def _on_surface(k, rise, size, node):
     """Return whether a straight segment, `size` long, is none because the path ends there on obstacle k's surface.
 
-    normal: its direction's component along the surface's normal.
+    rise: the component along the surface's normal of the direction from the contact to the end; negative where the end
+    lies below, by no more than the share of the size from which on it counts as inside.
     """
-    return size <= ON_SURFACE * node[k, SIZE] and size * abs(normal) <= SUNK * node[k, SIZE]
+    return size <= ON_SURFACE * node[k, SIZE] and size * rise <= SUNK * node[k, SIZE]
 
 
 @inlined
@@ -138,7 +139,7 @@ def _connect(lo, hi, ends, node):
         along = _dot(node, k, W_E, k, W_TP)
         normal = _dot(node, k, W_E, k, W_NP)
         binormal = _dot(node, k, W_E, k, W_BP)
-        if last < 0 and _on_surface(k, normal, size, node):
+        if last < 0 and _on_surface(k, -normal, size, node):
             along, normal, binormal = 1.0, 0.0, 0.0
         node[k, W_CP] = along
         node[k, W_CP + 1] = normal
@@ -316,7 +317,7 @@ def _pin(lo, hi, ends, node):
         if node[k, S_MODE] != TOUCHED:
             continue
         normal = _dot(node, k, W_E, k, W_NP)
-        if node[k, W_L] <= PINNED * node[k, SIZE] or not _on_surface(k, normal, node[k, W_L], node):
+        if node[k, W_L] <= PINNED * node[k, SIZE] or not _on_surface(k, -normal, node[k, W_L], node):
             return False
         x, y, z = into_frame(node, k, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5])
         x, y, z, _, _, _ = project(node, k, x, y, z)
