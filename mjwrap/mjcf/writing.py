@@ -167,17 +167,20 @@ def _write(
         texts[DYNAMICS] = dynamics.dynamics
     keep = (TIMES, SMOOTHING, DYNAMICS) if dynamics is None else ()
     elements = [e for e in _elements(entry) if not _is_parameter(e[0], e[1], keep)]
-    known = {n.name: n for n in spec.numerics} | {t.name: t for t in spec.texts}
+    # what is there is changed in place: MuJoCo 4 deletes a tuple with an element of it
+    known_numerics, known_texts = {n.name: n for n in spec.numerics}, {t.name: t for t in spec.texts}
     for key, values in numerics.items():
         name = f"mjwrap_{muscle}_{key}"
-        if name in known:
-            spec.delete(known[name])
-        spec.add_numeric(name=name, data=values, size=len(values))
+        if name in known_numerics:
+            known_numerics[name].data, known_numerics[name].size = values, len(values)
+        else:
+            spec.add_numeric(name=name, data=values, size=len(values))
         elements.append((OBJ.mjOBJ_NUMERIC, name, 0.0))
     for key, words in texts.items():
         name = f"mjwrap_{muscle}_{key}"
-        if name in known:
-            spec.delete(known[name])
-        spec.add_text(name=name, data=words)
+        if name in known_texts:
+            known_texts[name].data = words
+        else:
+            spec.add_text(name=name, data=words)
         elements.append((OBJ.mjOBJ_TEXT, name, 0.0))
     _set_elements(entry, elements)
