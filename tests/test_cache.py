@@ -175,6 +175,18 @@ def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
     assert again.numbers == before.numbers
 
 
+LOOK = """
+import json, mjwrap as mw
+from mjwrap.kernels import _jit
+muscles = [mw.Millard2012(100.0, 0.1, 0.2), mw.DeGrooteFregly2016(100.0, 0.1, 0.2), mw.MuscleSystem]
+print(json.dumps({"numbers": [], "folder": _jit._CACHE}))
+"""
+
+
+def test_an_import_compiles_nothing(tmp_path: Path) -> None:
+    assert run(LOOK, tmp_path / "cache").told == []
+
+
 KERNELS = sorted(path.name for path in (PACKAGE / "kernels").glob("*.py"))
 
 

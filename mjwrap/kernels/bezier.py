@@ -46,7 +46,7 @@ def corners(ends: list[Corner], curviness: list[float]) -> Array:
     return np.array(rows)
 
 
-def blend(q, r, u):
+def coordinate(q, r, u):
     """Return a coordinate of a corner at u in [0, 1], counted from one end in units of both ends, and its slope."""
     v = 1.0 - u
     uu, vv = u * u, v * v
@@ -55,7 +55,7 @@ def blend(q, r, u):
     return q * b + r * e + uu * uu * u, q * d + r * f + 5.0 * uu * uu
 
 
-blend = jit(blend)
+blend = jit(coordinate)  # of numbers; the plain form takes arrays, and compiles nothing at an import
 
 
 def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
@@ -113,6 +113,13 @@ def _pieces(curve: Array) -> Array:
     return found[np.argsort(found[:, MIDDLE])]
 
 
+def sampled(curve: Array, count: int) -> tuple[Array, Array]:
+    """Return x and y of a curve at `count` parts of the width of each corner, from left to right."""
+    parts = np.broadcast_to(np.linspace(0.0, 1.0, count), (len(curve), count))
+    y, _ = _curve(curve[:, None], parts)
+    return (curve[:, X0, None] + curve[:, DX, None] * parts).ravel(), y.ravel()
+
+
 def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
     """Return y and dy/dx at parts (n, k) of the widths of corners (n, 1, 10).
 
@@ -122,7 +129,7 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
     part = np.clip(part, 0.0, 1.0)
     low, high, u = np.zeros_like(part), np.ones_like(part), part
     for _ in range(MOST):
-        value, slope = blend(xq, xr, u)
+        value, slope = coordinate(xq, xr, u)
         low, high = np.where(value < part, u, low), np.where(value < part, high, u)
         new = u + (part - value) / slope
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
@@ -130,8 +137,8 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
         u = new
         if last:
             break
-    y, up = blend(yq, yr, u)
-    return y0 + dy * y, dy * up / (dx * blend(xq, xr, u)[1])
+    y, up = coordinate(yq, yr, u)
+    return y0 + dy * y, dy * up / (dx * coordinate(xq, xr, u)[1])
 
 
 @jit
