@@ -50,8 +50,8 @@ def parameters(model: mujoco.MjModel, index: int) -> dict[str, float]:
     known = set().union(*PARAMETERS.values())
     found: dict[str, float] = {}
     for kind, obj, _ in elements(model, index):
-        if kind == OBJ.mjOBJ_NUMERIC:
-            name = name_of(model, OBJ.mjOBJ_NUMERIC, obj)
+        name = name_of(model, OBJ.mjOBJ_NUMERIC, obj) if kind == OBJ.mjOBJ_NUMERIC else "_size"
+        if not name.endswith("_size"):  # of a surface
             (key,) = [key for key in known if key in name]
             found[key] = float(model.numeric_data[model.numeric_adr[obj]])
     return found
