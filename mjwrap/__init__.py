@@ -13,6 +13,7 @@ from mjwrap.errors import (
     RecordingError,
     SignalError,
     StateError,
+    TableError,
     VersionError,
 )
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     )
     from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
     from mjwrap.energetics import Energetics, Umberger2010, basal_power
+    from mjwrap.files import Table, read_table, write_table
     from mjwrap.fitting import (
         Fit,
         fit_capsule,
@@ -93,6 +95,9 @@ _HOMES = {
     "ViaPoint": "paths",
     "solve_path": "paths",
     "solve_sweep": "paths",
+    "Table": "files",
+    "read_table": "files",
+    "write_table": "files",
     "Fit": "fitting",
     "fit_capsule": "fitting",
     "fit_cone": "fitting",
@@ -157,6 +162,8 @@ __all__ = [
     "StateError",
     "Status",
     "SweepSolution",
+    "Table",
+    "TableError",
     "Torus",
     "Umberger2010",
     "VersionError",
@@ -176,10 +183,12 @@ __all__ = [
     "length_ranges",
     "load",
     "mesh_points",
+    "read_table",
     "set_laws",
     "simulate_muscle",
     "solve_path",
     "solve_sweep",
+    "write_table",
 ]
 
 

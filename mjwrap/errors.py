@@ -42,6 +42,10 @@ class SignalError(MjwrapError, ValueError):
     """
 
 
+class TableError(SignalError):
+    """A table over time cannot be read or written; the message names file, line and column."""
+
+
 class RecordingError(MjwrapError, OSError):
     """A recording could not be written: no such folder, no permission, or no space left."""
 

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from mjwrap.errors import SignalError
-from mjwrap.signals import Signal, parse_pattern, pattern_forms, read_table
+from mjwrap.files import SUFFIXES, read_table
+from mjwrap.signals import Samples, Signal, match_columns, parse_pattern, pattern_forms
 from mjwrap.system import MuscleSystem
 
 
@@ -25,9 +26,10 @@ class Excitation:
     """Signals for the muscles and other actuators of a model.
 
     entries: in order, a later one wins: a pattern ("sine:0.3,1,0.4") for all muscles; NAME=PATTERN for the muscles and
-    actuators whose names match NAME (`*` and `?` stand for anything); or the name of a CSV file with a column `time`
-    and one for each muscle or actuator that it drives. seed: for the pattern `random`. What no entry names keeps its
-    control. `SignalError` for an entry that cannot be understood or that names nothing in the model.
+    actuators whose names match NAME (`*` and `?` stand for anything); or the name of a table (.csv, .sto, .mot, .npz)
+    with a column for each muscle or actuator that it drives (`match_columns`). seed: for the pattern `random`. What no
+    entry names keeps its control. `SignalError` for an entry that cannot be understood or that names nothing in the
+    model.
     """
 
     def __init__(self, muscles: MuscleSystem, entries: Sequence[str], seed: int = 0) -> None:
@@ -60,11 +62,10 @@ class Excitation:
                 known = ", ".join(self.names) or "none"
                 raise SignalError(f"'{entry}': no muscle or actuator '{name}'; there are: {known}")
             self._fill(found, pattern)
-        elif entry.lower().endswith(".csv") or os.path.isfile(entry):
+        elif entry.lower().endswith(SUFFIXES) or os.path.isfile(entry):
             table = read_table(entry)
-            table.require(self.names, "muscle or actuator")
-            for column in table.columns:
-                self.signals[column] = table.signal(column)
+            for column, driven in match_columns(table, self.names, "muscle or actuator").items():
+                self.signals[driven] = Samples(table.time, table[column])
         elif os.sep in entry:
             raise SignalError(f"'{entry}' is neither a file nor a pattern; patterns: {pattern_forms()}")
         else:

@@ -1,10 +1,8 @@
-"""Numbers over time for excitations, controls and prescribed motion: patterns written in a few words, and CSV files."""
+"""Numbers over time for excitations, controls and prescribed motion: patterns written in a few words, and tables."""
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import SignalError
+from mjwrap.files import Table
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
@@ -185,77 +184,33 @@ def _maker(text: str, kind: str, numbers: list[float], seed: int) -> Maker:
     return lambda name, index, count: Wander((int(chosen), zlib.crc32(name.encode())), hold)
 
 
-@dataclass(frozen=True)
-class Table:
-    """Columns of numbers over time, as read from a file: times (T,) [s], columns by name (T,)."""
+def match_columns(table: Table, known: Sequence[str], what: str) -> dict[str, str]:
+    """Return the name among `known` that each column of a table drives, by column.
 
-    path: str
-    times: Array
-    columns: dict[str, Array]
-
-    def signal(self, column: str) -> Samples:
-        """Return one column as a signal."""
-        return Samples(self.times, self.columns[column])
-
-    def require(self, known: Sequence[str], what: str) -> None:
-        """Raise `SignalError` for columns that are none of the `known` names, and list these."""
-        unknown = [name for name in self.columns if name not in known]
-        if unknown:
-            s = "s" * (len(unknown) != 1)
-            raise SignalError(
-                f"{self.path}: no {what} for column{s} {', '.join(repr(n) for n in unknown)}; "
-                f"there are: {', '.join(known) or 'none'}"
-            )
-
-
-def read_table(path: str | os.PathLike[str]) -> Table:
-    """Read a CSV file: a header with `time` [s] and names, then rows of finite numbers, times increasing.
-
-    `SignalError` names file, line and column of the first thing that is wrong.
+    A column is called as what it drives; or "ctrl:NAME", as `mjwrap run` writes it, which leaves out the other kinds
+    there; or as OpenSim does, "/forceset/NAME", "NAME.excitation" or "/jointset/JOINT/NAME/value". `SignalError`
+    lists the known names where a column is none of these.
     """
-    name = os.fspath(path)
-    try:
-        with open(name, encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row[1])]
-    except OSError as error:
-        raise SignalError(f"cannot read '{name}': {(error.strerror or str(error)).lower()}") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise SignalError(f"'{name}' is not a text file with comma-separated values") from None
-    if not rows:
-        raise SignalError(f"'{name}' is empty; wanted: a header with 'time' and names, then rows of numbers")
-    header = [cell.strip() for cell in rows[0][1]]
-    if "time" not in header:
-        raise SignalError(f"'{name}' has no column 'time' [s]; its columns: {', '.join(header)}")
-    double = sorted({column for column in header if header.count(column) > 1})
-    if double or "" in header:
-        which = ", ".join(double) or "the blank ones"
-        raise SignalError(f"'{name}': every column needs a name of its own; look at {which}")
-    if len(rows) < 2:
-        raise SignalError(f"'{name}' has a header but no rows")
-    numbers = np.array([_numbers(name, line, header, row) for line, row in rows[1:]])
-    times = numbers[:, header.index("time")]
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if late.size:
-        line = rows[int(late[0]) + 2][0]
+    own = [column for column in table.names if column.startswith("ctrl:")]
+    found = {column: _known(column, known) for column in own or table.names}
+    unknown = [column for column, name in found.items() if name not in known]
+    if unknown:
+        s = "s" * (len(unknown) != 1)
         raise SignalError(
-            f"'{name}' line {line}: time {times[late[0] + 1]:g} does not come after {times[late[0]]:g}"
+            f"{table.source}: no {what} for column{s} {', '.join(repr(n) for n in unknown)}; "
+            f"there are: {', '.join(known) or 'none'}"
         )
-    columns = {column: numbers[:, i].copy() for i, column in enumerate(header) if column != "time"}
-    return Table(name, times.copy(), columns)
-
-
-def _numbers(name: str, line: int, header: list[str], row: list[str]) -> list[float]:
-    if len(row) != len(header):
-        raise SignalError(f"'{name}' line {line}: {len(row)} cells where the header has {len(header)}")
-    values = []
-    for column, cell in zip(header, row, strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
+    for column, name in found.items():
+        others = [other for other in found if other != column and found[other] == name]
+        if others:
             raise SignalError(
-                f"'{name}' line {line}, column '{column}': {cell.strip()!r} is not a number"
-            ) from None
-        if not math.isfinite(value):
-            raise SignalError(f"'{name}' line {line}, column '{column}': {cell.strip()} is not finite")
-        values.append(value)
-    return values
+                f"{table.source}: columns '{column}' and '{others[0]}' are both {what} '{name}'"
+            )
+    return found
+
+
+def _known(column: str, known: Sequence[str]) -> str:
+    """Return the first of a column's readings that is a known name."""
+    short = column.removesuffix(".excitation").removesuffix("/excitation").removesuffix("/value")
+    readings = (column, column.removeprefix("ctrl:"), short, short.rpartition("/")[2])
+    return next((name for name in readings if name in known), column)

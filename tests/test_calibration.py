@@ -7,8 +7,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from cli_runs import ELBOW, run_here
 from scipy.optimize import differential_evolution
-from script_runs import ELBOW, run_here
 
 import mjwrap as mw
 from mjwrap.calibration.joints import JointSpace
@@ -391,17 +391,17 @@ def test_random_poses_of_the_arm_stay_within_its_ranges() -> None:
     assert ((high - low) / span).mean() < 0.97
 
 
-def test_the_script_prints_the_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_command_prints_the_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "planted.mjb"
     mujoco.mj_saveModel(planted(), str(path))
     facts = tmp_path / "report.json"
-    ran = run_here("inspect_muscles", capsys, path, "--json", facts)
+    ran = run_here("inspect", capsys, path, "--json", facts)
     assert ran.code == 0
     assert "loose" in ran.out
     assert "slack throughout" in ran.out
     read = json.loads(facts.read_text())
     assert {f["muscle"] for f in read["findings"]} == set(PLANTED) - {"sane"} | {"exceeded", "negative"}
-    assert run_here("inspect_muscles", capsys, path, "--strict", "--quick").code == 1
-    wrong = run_here("inspect_muscles", capsys, path, "--range", "slip=0,1")
+    assert run_here("inspect", capsys, path, "--strict", "--quick").code == 1
+    wrong = run_here("inspect", capsys, path, "--range", "slip=0,1")
     assert wrong.code == 2
     assert "slide" in wrong.err

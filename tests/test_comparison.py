@@ -6,7 +6,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from script_runs import CASE2, ELBOW
+from cli_runs import CASE2, ELBOW
 
 import mjwrap as mw
 from mjwrap.comparison import (

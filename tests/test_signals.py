@@ -8,7 +8,7 @@ import pytest
 
 import mjwrap as mw
 from mjwrap.excitation import Excitation
-from mjwrap.signals import Constant, Sine, parse_pattern, pattern_forms, read_table
+from mjwrap.signals import Constant, Samples, Sine, parse_pattern, pattern_forms
 
 TWO = """
 <mujoco>
@@ -122,7 +122,8 @@ def test_an_unknown_pattern_lists_the_forms() -> None:
 def test_a_table_is_interpolated_and_held_outside(tmp_path: Path) -> None:
     path = tmp_path / "u.csv"
     path.write_text("\ufefftime, flexor\n0,0\n\n2,1\n3,0.5\n", encoding="utf-8")
-    signal = read_table(path).signal("flexor")
+    table = mw.read_table(path)
+    signal = Samples(table.time, table["flexor"])
     assert [signal.value(t) for t in (-1.0, 0.0, 1.0, 2.5, 9.0)] == [0.0, 0.0, 0.5, 0.75, 0.5]
 
 
@@ -145,18 +146,18 @@ def test_a_wrong_table_is_told_with_its_line(text: str, told: str, tmp_path: Pat
     path = tmp_path / "u.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(mw.SignalError, match=told) as caught:
-        read_table(path)
+        mw.read_table(path)
     assert "u.csv" in str(caught.value)
 
 
 def test_a_table_that_is_not_text_or_not_there_is_told(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_bytes(b"\xff\xfe\x00\x80")
     with pytest.raises(mw.SignalError, match="not a text file"):
-        read_table(tmp_path / "u.csv")
+        mw.read_table(tmp_path / "u.csv")
     with pytest.raises(mw.SignalError, match="no such file"):
-        read_table(tmp_path / "v.csv")
+        mw.read_table(tmp_path / "v.csv")
     with pytest.raises(mw.SignalError, match="directory"):
-        read_table(tmp_path)
+        mw.read_table(tmp_path)
 
 
 def test_a_pattern_drives_muscles_and_leaves_other_actuators_alone(model: mujoco.MjModel) -> None:

@@ -24,7 +24,7 @@ from mjwrap.system import MuscleSystem
 Found = Iterator[tuple[Implausible, float, float, str]]
 
 
-class _Unit(NamedTuple):
+class Unit(NamedTuple):
     """A muscle of any law as fibre and rigid tendon: F_max [N], lengths [m], sin α₀, declared length range [m].
 
     The fibre of an actuator without one has length NaN.
@@ -42,19 +42,19 @@ class _Unit(NamedTuple):
         return along if along <= 0.0 else math.hypot(along, self.height)
 
 
-def _unit(law: Law) -> _Unit:
+def as_unit(law: Law) -> Unit:
     """Return the parameters of a law; one without fibre and tendon has a force only."""
     if isinstance(law, MuJoCoMuscle):
         short, long = (x / law.gear for x in law.length_range)
         optimal = (long - short) / (law.prm[1] - law.prm[0])
-        return _Unit(mujoco_peak_force(law), optimal, short - law.prm[0] * optimal, 0.0, (short, long))
+        return Unit(mujoco_peak_force(law), optimal, short - law.prm[0] * optimal, 0.0, (short, long))
     if isinstance(law, PathActuator):
-        return _Unit(law.optimal_force, math.nan, math.nan, 0.0, None)
+        return Unit(law.optimal_force, math.nan, math.nan, 0.0, None)
     peak, optimal, slack = (
         float(getattr(law, name))
         for name in ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
     )
-    return _Unit(peak, optimal, slack, math.sin(getattr(law, "pennation_angle", 0.0)), None)
+    return Unit(peak, optimal, slack, math.sin(getattr(law, "pennation_angle", 0.0)), None)
 
 
 def implausible(
@@ -77,7 +77,7 @@ def implausible(
     findings: list[Finding] = []
     remarks: dict[str, tuple[str, ...]] = {}
     for i, muscle in enumerate(muscles.declarations):
-        unit, known = _unit(muscle.parameters), ranges.get(muscle.name)
+        unit, known = as_unit(muscle.parameters), ranges.get(muscle.name)
         found = list(_alone(unit, limits))
         if known is not None and np.isfinite([known.shortest, known.longest]).all():
             found += _over_range(unit, known, limits)
@@ -96,12 +96,12 @@ def implausible(
         if isinstance(law, str):
             told = f"{told}; and its parameters have no meaning: {law}"
         else:
-            findings += [Finding(name, *parts) for parts in _alone(_unit(law), limits)]
+            findings += [Finding(name, *parts) for parts in _alone(as_unit(law), limits)]
         remarks[name] = (told,)
     return ParameterReport(tuple(findings), remarks, dict(ranges))
 
 
-def _alone(unit: _Unit, limits: ParameterLimits) -> Found:
+def _alone(unit: Unit, limits: ParameterLimits) -> Found:
     """Find what the parameters show by themselves."""
     low, high = limits.force
     if not unit.peak >= low:
@@ -121,7 +121,7 @@ def _alone(unit: _Unit, limits: ParameterLimits) -> Found:
         yield Implausible.LONG_TENDON, ratio, long, words
 
 
-def _over_range(unit: _Unit, known: LengthRange, limits: ParameterLimits) -> Found:
+def _over_range(unit: Unit, known: LengthRange, limits: ParameterLimits) -> Found:
     """Find what shows over the joints' ranges."""
     if math.isnan(unit.optimal):
         return

@@ -6,10 +6,10 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from _common import Output
-from _compare_files import TITLES
-from _plot_run import save
 
+from mjwrap.cli.compare_files import TITLES
+from mjwrap.cli.output import Output
+from mjwrap.cli.plot_run import save
 from mjwrap.comparison import AGREE, MotionDifference, MuscleSummary, Outcome, PoseComparison
 
 COLOURS = {

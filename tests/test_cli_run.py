@@ -1,4 +1,4 @@
-"""scripts/simulate.py: what it computes is what the package computes, and what it says when it cannot."""
+"""mjwrap run: what it computes is what the package computes, and what it says when it cannot."""
 
 import csv
 import math
@@ -13,8 +13,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from cli_runs import CASE2, ELBOW, ROOT, Ran, environment, finish, run_here, said, start
 from naive_tendon import cylinder_length
-from script_runs import CASE2, ELBOW, ROOT, SCRIPTS, Ran, environment, finish, run_here, said, start
 
 import mjwrap as mw
 
@@ -53,7 +53,7 @@ def rows_of(path: Path) -> list[dict[str, float]]:
 
 
 def simulate(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
-    return run_here("simulate", capsys, *arguments)
+    return run_here("run", capsys, *arguments)
 
 
 def only_files(folder: Path, *names: str) -> None:
@@ -247,7 +247,7 @@ def test_a_mistake_is_told_in_one_line_and_leaves_nothing(
     ran = simulate(capsys, *filled)
     assert ran.code == 2
     (line,) = said(ran)
-    assert line.startswith("simulate: ")
+    assert line.startswith("mjwrap run: ")
     assert re.search(told, line), line
     assert ran.out == ""
     only_files(tmp_path, "text.xml", "nan.csv", "sub.csv")
@@ -277,12 +277,12 @@ def test_a_path_that_is_not_found_is_counted_or_stops_a_strict_run(
     swing = ["--prescribe", "slide=sine:-0.09,50"]
     ran = simulate(capsys, *options, *swing, "--strict")
     assert ran.code == 1
-    assert re.match("simulate: .*'stuck'.*site 'b' is inside geom 'ball'", said(ran)[-1])
+    assert re.match("mjwrap run: .*'stuck'.*site 'b' is inside geom 'ball'", said(ran)[-1])
     only_files(tmp_path, "m.xml")
     ran = simulate(capsys, *options, "--qpos", "slide=-0.09")
     assert ran.code == 2
     assert re.match(
-        "simulate: muscle 'stuck' has no path at the start.*site 'b' is inside geom 'ball'", said(ran)[-1]
+        "mjwrap run: muscle 'stuck' has no path at the start.*site 'b' is inside geom 'ball'", said(ran)[-1]
     )
     only_files(tmp_path, "m.xml")
     ran = simulate(capsys, *options, *swing)
@@ -299,7 +299,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
     outputs = ["--csv", tmp_path / "c.csv", "--sample", 0.001]
-    ran = finish(start("simulate", ELBOW, "--duration", 5, *outputs, preexec_fn=limit))
+    ran = finish(start("run", ELBOW, "--duration", 5, *outputs, preexec_fn=limit))
     assert ran.code == 1
     (line,) = said(ran)
     assert "c.csv" in line
@@ -310,7 +310,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
 def test_ctrl_c_keeps_what_was_simulated(tmp_path: Path) -> None:
     table, plot, recording = tmp_path / "c.csv", tmp_path / "p.png", tmp_path / "r.rrd"
     outputs = ["--csv", table, "--plot", plot, "--record", recording]
-    process = start("simulate", ELBOW, "--duration", 1e5, "--excitation", "random", *outputs)
+    process = start("run", ELBOW, "--duration", 1e5, "--excitation", "random", *outputs)
     parts = time.monotonic() + 60
     while not any(p.suffix == ".csv" and p.stat().st_size > 20_000 for p in tmp_path.iterdir()):
         assert time.monotonic() < parts, "the run did not start"
@@ -319,14 +319,14 @@ def test_ctrl_c_keeps_what_was_simulated(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     ran = finish(process)
     assert ran.code == 130, ran.err
-    assert said(ran) == ["simulate: stopped by Ctrl-C; the files hold what was simulated"]
+    assert said(ran) == ["mjwrap run: stopped by Ctrl-C; the files hold what was simulated"]
     only_files(tmp_path, "c.csv", "p.png", "r.rrd")
     times = np.array([row["time"] for row in rows_of(table)])
     assert np.diff(times) == pytest.approx(
         0.006 * np.ones(len(times) - 1), abs=0.0045
     )  # whole rows to the last
     info = subprocess.run(
-        [sys.executable, str(SCRIPTS / "replay.py"), str(recording), "--info"],
+        [sys.executable, "-m", "mjwrap", "replay", str(recording), "--info"],
         capture_output=True, text=True, cwd=ROOT, env=environment(), check=True,
     )  # fmt: skip
     assert "BRA" in info.stdout
@@ -334,8 +334,8 @@ def test_ctrl_c_keeps_what_was_simulated(tmp_path: Path) -> None:
 
 def test_nothing_heavy_loads_unless_it_is_asked_for(tmp_path: Path) -> None:
     code = (
-        "import sys; sys.path.insert(0, 'scripts'); import simulate; "
-        f"code = simulate.main([{ELBOW!r}, '--duration', '0.01', '--csv', {str(tmp_path / 'c.csv')!r}]); "
+        "import sys; from mjwrap.cli import main; "
+        f"code = main(['run', {ELBOW!r}, '--duration', '0.01', '--csv', {str(tmp_path / 'c.csv')!r}]); "
         "print(code, sorted({'rerun', 'matplotlib', 'tqdm', 'pyarrow'} & set(sys.modules)))"
     )
     done = subprocess.run(

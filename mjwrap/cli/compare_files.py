@@ -1,16 +1,16 @@
-"""A comparison as text, JSON and CSV."""
+"""A comparison as text, as values, and as rows of a table."""
 
 from __future__ import annotations
 
 import csv
-import json
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
-from _common import Output
 
 import mjwrap
+from mjwrap.cli.output import Output
 from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, Verdict
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch
@@ -30,6 +30,9 @@ _HEADER = (
     "motion", "at", "muscle", "outcome", "length_mujoco", "length_mjwrap", "velocity_mujoco", "velocity_mjwrap",
     "moment_arm_difference", "fault_mujoco", "fault_mjwrap", "status_mjwrap",
 )  # fmt: skip
+
+
+Say = Callable[[str], object]
 
 
 class PoseTable:
@@ -60,57 +63,57 @@ class PoseTable:
         self._output.publish()
 
 
-def print_poses(found: PoseComparison, verdicts: dict[str, Verdict]) -> None:
-    """Print counts and the largest differences of every muscle, then the verdicts and the jumps."""
+def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) -> None:
+    """Say counts and the largest differences of every muscle, then the verdicts and the jumps."""
     both = [s for s in found.muscles.values() if not s.native_only]
     if both:
-        _print_table(found, both)
-    print("\nwhich is right, and why")
+        _tell_table(say, found, both)
+    say("\nwhich is right, and why")
     equal = [s for s in both if s.counts[Outcome.AGREE.name] == s.poses and verdicts[s.name].right == "both"]
     if equal:
         length, velocity, arm = np.max([s.agreement for s in equal], axis=0)
         told = f"to {length:.0e} m, {velocity:.0e} m/s, {arm:.0e} m/rad"
-        print(f"  both, equal at every pose {told}: {', '.join(s.name for s in equal)}")
+        say(f"  both, equal at every pose {told}: {', '.join(s.name for s in equal)}")
     for name, (right, why) in verdicts.items():
         if found.muscles[name] not in equal:
-            print(f"  {name}: {right}: {why}" if right != "-" else f"  {name}: {why}")
+            say(f"  {name}: {right}: {why}" if right != "-" else f"  {name}: {why}")
     for name, why in found.left_out.items():
-        print(f"  {name}: not compared: {why}")
+        say(f"  {name}: not compared: {why}")
     far = [s for s in both if s.length.difference > AGREE]
     if far:
-        print("\nwhere lengths differ most")
+        say("\nwhere lengths differ most")
         for s in sorted(far, key=lambda s: -s.length.difference)[:10]:
-            print(
+            say(
                 f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {_where(s.length)}"
             )
     if found.jumps:
-        _print_jumps(found.jumps)
+        _tell_jumps(say, found.jumps)
 
 
-def _print_table(found: PoseComparison, both: list[MuscleSummary]) -> None:
+def _tell_table(say: Say, found: PoseComparison, both: list[MuscleSummary]) -> None:
     shown = [o for o in Outcome if o == Outcome.AGREE or found.total(o)]
     wide = max(6, *(len(s.name) for s in both))
     heads = [TITLES[o] for o in shown]
     columns = "".join(f"  {head:>{max(len(head), 6)}}" for head in heads)
-    print(
+    say(
         f"{'muscle':{wide}}  {'poses':>6}{columns}   largest difference: length [m]  velocity [m/s]  arm [m/rad]"
     )
     for s in both:
         counts = "".join(f"  {s.counts[o.name]:>{max(len(h), 6)}}" for o, h in zip(shown, heads, strict=True))
         gaps = s.length.difference, s.velocity.difference, s.moment_arm.difference
-        print(f"{s.name:{wide}}  {s.poses:>6}{counts}   {gaps[0]:>31.1e}{gaps[1]:>16.1e}{gaps[2]:>13.1e}")
+        say(f"{s.name:{wide}}  {s.poses:>6}{counts}   {gaps[0]:>31.1e}{gaps[1]:>16.1e}{gaps[2]:>13.1e}")
 
 
-def _print_jumps(jumps: list[Jump]) -> None:
-    """Print the largest jump of each program, muscle and joint."""
+def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
+    """Say the largest jump of each program, muscle and joint."""
     largest: dict[tuple[str, str, str], Jump] = {}
     for jump in jumps:
         key = jump.program, jump.muscle, jump.sweep
         if key not in largest or abs(jump.length) > abs(largest[key].length):
             largest[key] = jump
-    print(f"\njumps along the sweeps: {len(jumps)}, the largest of each muscle and joint")
+    say(f"\njumps along the sweeps: {len(jumps)}, the largest of each muscle and joint")
     for jump in sorted(largest.values(), key=lambda j: (j.program, j.muscle, j.sweep)):
-        print(
+        say(
             f"  {jump.program} {jump.muscle} at {jump.sweep} = {jump.at:.6f}: {1e3 * jump.length:+.3f} mm, "
             f"moment arm {-1e3 * jump.slope:+.3f} mm; {jump.before} -> {jump.after}"
         )
@@ -123,33 +126,29 @@ def _where(extreme: Extreme) -> str:
     return f"{extreme.motion} {extreme.at:g} ({told}{', ...' if len(extreme.joints) > 6 else ''})"
 
 
-def print_motion(motion: MotionDifference, changed: list[str], entries: list[str]) -> None:
-    """Print how far the two runs drift apart."""
-    print(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
+def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: list[str]) -> None:
+    """Say how far the two runs drift apart."""
+    say(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
     if changed:
         s = "s" * (len(changed) != 1)
-        print(
+        say(
             f"  {len(changed)} muscle{s} with another law pull by MuJoCo's curves (--law declared: by their own)"
         )
     dof, gap, when = motion.worst()
     last, final = motion.final()
-    print(
-        f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]"
-    )
+    say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")
     if motion.stopped:
-        print(f"  ended early: {motion.stopped}")
+        say(f"  ended early: {motion.stopped}")
     if motion.paths:
-        print("  mjwrap's run had no path (and held the last good force) for")
-        print("\n".join(f"    {line}" for line in motion.paths.splitlines()))
+        say("  mjwrap's run had no path (and held the last good force) for")
+        say("\n".join(f"    {line}" for line in motion.paths.splitlines()))
 
 
-def write_json(
-    output: Output, facts: dict[str, Any], found: PoseComparison, verdicts: dict[str, Verdict],
-    motion: MotionDifference | None,
-) -> None:  # fmt: skip
-    """Write everything as JSON and give the file its name."""
+def as_values(
+    found: PoseComparison, verdicts: dict[str, Verdict], motion: MotionDifference | None
+) -> dict[str, Any]:
+    """Return everything as values."""
     content: dict[str, Any] = {
-        **facts,
         "mujoco": mujoco.__version__,
         "mjwrap": mjwrap.__version__,
         "poses": found.poses,
@@ -169,9 +168,7 @@ def write_json(
             "stopped": motion.stopped,
             "paths_not_found": motion.paths,
         }
-    with output.writing():
-        output.part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    output.publish()
+    return content
 
 
 def _muscle(s: MuscleSummary, verdict: Verdict) -> dict[str, Any]:

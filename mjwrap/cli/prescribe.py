@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from _common import UserError, find_joint
 from numpy.typing import NDArray
 
+from mjwrap.cli.errors import UserError
+from mjwrap.cli.models import find_joint, single_joints
 from mjwrap.errors import SignalError
-from mjwrap.signals import Constant, Sine, SmoothSignal, parse_pattern, read_table
+from mjwrap.files import read_table
+from mjwrap.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
 
 Array = NDArray[np.float64]
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 HEAVY = 1e9  # inertia of a prescribed joint, in those of the heaviest one
 
 
@@ -46,8 +49,9 @@ class Spline:
 class Prescribed:
     """The prescribed joints of a run.
 
-    entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a CSV file with a column `time` and one for
-    each joint. Positions in rad or m. The joints' armature is changed in `model`.
+    entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
+    column for each joint. Positions in rad or m, or in degrees where the table's header says so. The joints' armature
+    is changed in `model`.
     """
 
     def __init__(self, model: mujoco.MjModel, entries: Sequence[str]) -> None:
@@ -58,9 +62,12 @@ class Prescribed:
             if equals:
                 found[find_joint(model, name, entry)] = _smooth(name, pattern)
             else:
-                table = read_table(entry)
-                for column, values in table.columns.items():
-                    found[find_joint(model, column, entry)] = Spline(table.times, values)
+                table, joints = read_table(entry), single_joints(model)
+                for column, driven in match_columns(table, list(joints), "hinge or slide").items():
+                    joint = joints[driven]
+                    turns = table.in_degrees and int(model.jnt_type[joint]) == _HINGE
+                    values = np.radians(table[column]) if turns else table[column]
+                    found[joint] = Spline(table.time, values)
         self.joints = list(found)
         self._signals = list(found.values())
         self._qpos = np.array([model.jnt_qposadr[j] for j in found], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""scripts/compare_tendon.py: what it writes, and what it says when it cannot."""
+"""mjwrap compare: what it writes, and what it says when it cannot."""
 
 import csv
 import json
@@ -8,14 +8,14 @@ import time
 from pathlib import Path
 
 import pytest
-from script_runs import CASE2, ELBOW, Ran, finish, run_here, said, start
+from cli_runs import CASE2, ELBOW, Ran, finish, run_here, said, start
 from test_comparison import BALL
 
 from mjwrap.comparison.twins import Comparer
 
 
 def compare(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
-    return run_here("compare_tendon", capsys, *arguments)
+    return run_here("compare", capsys, *arguments)
 
 
 def only_files(folder: Path, *names: str) -> None:
@@ -79,7 +79,7 @@ def test_where_they_differ_it_says_who_is_right(tmp_path: Path, capsys: pytest.C
 def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
     """Half a comparison is none."""
     outputs = ["--csv", tmp_path / "c.csv", "--json", tmp_path / "j.json"]
-    process = start("compare_tendon", ELBOW, "--samples", 200_000, *outputs)
+    process = start("compare", ELBOW, "--samples", 200_000, *outputs)
     late = time.monotonic() + 60
     while len(list(tmp_path.iterdir())) < 2:
         assert time.monotonic() < late, "the comparison did not start"
@@ -88,7 +88,7 @@ def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     ran = finish(process)
     assert ran.code == 130, ran.err
-    assert said(ran) == ["compare_tendon: stopped by Ctrl-C"]
+    assert said(ran) == ["mjwrap compare: stopped by Ctrl-C"]
     only_files(tmp_path)
 
 
@@ -138,7 +138,7 @@ def test_a_mistake_is_told_in_one_line_and_leaves_nothing(
     ran = compare(capsys, *(a.format(text=text, bare=bare, folder=tmp_path) for a in arguments))
     assert ran.code == 2
     (line,) = said(ran)
-    assert line.startswith("compare_tendon: ")
+    assert line.startswith("mjwrap compare: ")
     assert re.search(told, line), line
     assert ran.out == ""
     only_files(tmp_path, "text.xml", "bare.xml")

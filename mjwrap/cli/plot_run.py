@@ -7,12 +7,12 @@ from typing import Any
 import matplotlib.pyplot as plt
 import mujoco
 import numpy as np
-from _common import Output
-from _history import History
 from matplotlib.colors import Normalize, PowerNorm
 from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
+from mjwrap.cli.history import History
+from mjwrap.cli.output import Output
 from mjwrap.mjcf import name_of
 
 Array = NDArray[np.float64]

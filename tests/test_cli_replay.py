@@ -1,4 +1,4 @@
-"""scripts/replay.py: says what a recording holds, serves it, and refuses a damaged one in one line."""
+"""mjwrap replay: says what a recording holds, serves it, and refuses a damaged one in one line."""
 
 import contextlib
 import signal
@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 
-from made_up_runs import ROOT, XML, simulate
+from made_up_runs import XML, simulate
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def model() -> mujoco.MjModel:
 
 
 def replay(*arguments: object) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, str(ROOT / "scripts" / "replay.py"), *map(str, arguments)]
+    command = [sys.executable, "-m", "mjwrap", "replay", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
 
 
@@ -79,7 +79,7 @@ def test_replay_serves_to_a_browser(model: mujoco.MjModel, tmp_path: Path) -> No
     assert taken.returncode == 2
     assert f"cannot serve at port {port}" in taken.stderr
 
-    command = [sys.executable, str(ROOT / "scripts" / "replay.py"), str(tmp_path / "run.rrd"), "--serve"]
+    command = [sys.executable, "-m", "mjwrap", "replay", str(tmp_path / "run.rrd"), "--serve"]
     with subprocess.Popen([*command, "--port", str(port)], stdout=subprocess.PIPE, text=True) as server:
         try:
             assert server.stdout is not None

@@ -1,6 +1,5 @@
-"""Running the scripts: in this process for speed, or in one of their own where that is what is tested."""
+"""Running commands: in this process for speed, or in one of their own where that is what is tested."""
 
-import importlib
 import os
 import subprocess
 import sys
@@ -9,14 +8,15 @@ from typing import NamedTuple
 
 import pytest
 
+from mjwrap.cli import main
+
 ROOT = Path(__file__).resolve().parent.parent
-SCRIPTS = ROOT / "scripts"
 ELBOW = str(ROOT / "models" / "elbow" / "elbow.xml")
 CASE2 = str(ROOT / "models" / "paper_case2" / "paper_case2.xml")
 
 
 class Ran(NamedTuple):
-    """What a script left: exit code, standard output and error."""
+    """What a command left: exit code, standard output and error."""
 
     code: int
     out: str
@@ -24,13 +24,10 @@ class Ran(NamedTuple):
 
 
 def run_here(name: str, capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
-    """Run a script's main function in this process."""
-    if str(SCRIPTS) not in sys.path:
-        sys.path.insert(0, str(SCRIPTS))
-    script = importlib.import_module(name)
+    """Run a command in this process."""
     capsys.readouterr()
     try:
-        code = script.main([str(argument) for argument in arguments])
+        code = main([name, *map(str, arguments)])
     except SystemExit as stop:
         code = int(stop.code or 0)
     captured = capsys.readouterr()
@@ -38,14 +35,14 @@ def run_here(name: str, capsys: pytest.CaptureFixture[str], *arguments: object) 
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of a script in a process of its own: this package, whether installed or not."""
+    """Return the environment of a command in a process of its own: this package, whether installed or not."""
     paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def start(name: str, *arguments: object, **options: object) -> "subprocess.Popen[str]":
-    """Start a script in a process of its own."""
-    command = [sys.executable, str(SCRIPTS / f"{name}.py"), *map(str, arguments)]
+    """Start a command in a process of its own."""
+    command = [sys.executable, "-m", "mjwrap", name, *map(str, arguments)]
     return subprocess.Popen(
         command,
         cwd=ROOT,
@@ -58,7 +55,7 @@ def start(name: str, *arguments: object, **options: object) -> "subprocess.Popen
 
 
 def finish(process: "subprocess.Popen[str]") -> Ran:
-    """Wait for a started script."""
+    """Wait for a started command."""
     out, err = process.communicate(timeout=120)
     return Ran(process.returncode, out, err)
 

@@ -1,0 +1,159 @@
+"""Compare MuJoCo's built-in tendon wrapping with mjwrap's paths on the same model, side by side.
+
+MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes. Every joint is swept over its
+range, around the start pose and around the middle of all ranges, and random poses are drawn. Each path is judged by
+its geometry: is it straight or a true geodesic, tangential where it meets the surface, nowhere below it, and a local
+minimum of length? Where the two differ, the verdict says which is right and why. Then both run forward with the same
+controls.
+
+Examples:
+  mjwrap compare models/elbow/elbow.xml --plot compare.png
+  mjwrap compare myo_sim:myoarm_r --samples 51 --bases 4 --muscles 'LAT*' DELT1 --json compare.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from mjwrap import MuscleSystem
+from mjwrap.cli.arguments import at_least, not_negative
+from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_poses
+from mjwrap.cli.errors import FAULTS, UserError
+from mjwrap.cli.models import load, start_keyframe, start_state
+from mjwrap.cli.output import Output, Report, add_json
+from mjwrap.cli.progress import need_matplotlib, progress_bar
+from mjwrap.comparison import PoseComparison, compare_motion, compare_poses, verdict, with_native_laws
+from mjwrap.excitation import Excitation
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which arguments there are."""
+    add = parser.add_argument
+    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
+    add("--muscles", nargs="+", metavar="NAME", help="only these (* and ? stand for anything)")
+    add(
+        "--samples",
+        type=at_least(3),
+        default=101,
+        metavar="N",
+        help="poses of a sweep, and random ones (%(default)s)",
+    )
+    add(
+        "--bases",
+        type=at_least(0),
+        default=1,
+        metavar="N",
+        help="further poses to sweep around (%(default)s)",
+    )
+    add(
+        "--seed",
+        type=at_least(0),
+        default=0,
+        metavar="N",
+        help="of all that is random (%(default)s)",
+    )
+    add("--keyframe", metavar="NAME", help="start pose (default: the model's own)")
+    add(
+        "--duration", type=not_negative, default=1.0, metavar="S", help="of the motion; 0: none (%(default)s)"
+    )
+    add(
+        "--excitation",
+        nargs="+",
+        default=["random"],
+        metavar="PATTERN",
+        help="as mjwrap run takes it (random)",
+    )
+    add("--law", choices=("mujoco", "declared"), default="mujoco", help="in mjwrap's run: MuJoCo's own curves, so that "
+        "both differ by the path alone, or the declared law")  # fmt: skip
+    add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
+    add("--csv", metavar="FILE.csv", help="a row for every muscle and pose")
+    add_json(parser, "all figures")
+    add("--check", action="store_true", help="exit code 1 where mjwrap is not right")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Compare, and say and write what came of it."""
+    model = load(options.model)
+    key = start_keyframe(model, options.keyframe)
+    start = start_state(model, key)
+    muscles = MuscleSystem(model)
+    names = choose(muscles, options.muscles)
+    Excitation(muscles, options.excitation, options.seed)  # so that a mistake in it shows before the work
+    plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
+    table = Output(options.csv, "--csv", (".csv",)) if options.csv else None
+    report = Report(options.json)
+    if plot is not None:
+        need_matplotlib()
+    rows = PoseTable(table) if table is not None else None
+    found = compare_all(model, names, options, start, rows)
+    verdicts = {
+        name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
+        for name, summary in found.muscles.items()
+    }
+    count = len(found.muscles)
+    report.say(f"{options.model}: {count} muscle{'s' * (count != 1)} at {found.poses} poses each")
+    tell_poses(report.say, found, verdicts)
+    if rows is not None:
+        rows.close()
+
+    motion = None
+    if options.duration > 0.0:
+        moved, changed = with_native_laws(model) if options.law == "mujoco" else (model, [])
+        motion = compare_motion(moved, options.excitation, options.duration, key=key, seed=options.seed)
+        tell_motion(report.say, motion, changed, options.excitation)
+    if plot is not None:
+        from mjwrap.cli.plot_compare import plot_comparison
+
+        title = f"{Path(options.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
+        plot_comparison(plot, title, found, motion)
+    for what, path in (("plot", options.plot), ("csv", options.csv)):
+        if path:
+            report.say(f"{what + ':':10s} {path}")
+    given = {name: getattr(options, name) for name in ("model", "samples", "bases", "seed")}
+    report.finish({**given, **as_values(found, verdicts, motion)})
+    wrong = found.at_fault or any(jump.program == "mjwrap" for jump in found.jumps)
+    return FAULTS if options.check and wrong else 0
+
+
+def compare_all(
+    model: mujoco.MjModel, names: list[str] | None, options: argparse.Namespace, start: mujoco.MjData,
+    rows: PoseTable | None,
+) -> PoseComparison:  # fmt: skip
+    """Compare at all poses, with a progress bar."""
+    bars: list[Any] = []
+
+    def advance(name: str, k: int, count: int) -> None:
+        if not bars:
+            bars.append(progress_bar(count, "motions", "comparing"))
+        bars[0].set_description_str(name)
+        bars[0].update(int(k > 0))
+
+    try:
+        return compare_poses(
+            model, names=names, samples=options.samples, bases=options.bases, seed=options.seed,
+            base=start.qpos, each=rows.add if rows is not None else None, progress=advance,
+        )  # fmt: skip
+    finally:
+        for bar in bars:
+            bar.close()
+
+
+def choose(muscles: MuscleSystem, wanted: list[str] | None) -> list[str] | None:
+    """Return the names of the muscles that the patterns `wanted` match, None for all."""
+    known = [*muscles.names, *muscles.native]
+    if not known:
+        raise UserError("the model has no muscles: nothing to compare")
+    if wanted is None:
+        return None
+    found: list[str] = []
+    for pattern in wanted:
+        fit = [name for name in fnmatch.filter(known, pattern) if name not in found]
+        if not fit and pattern not in found:
+            raise UserError(f"no muscle '{pattern}'; muscles: {', '.join(known)}")
+        found += fit
+    return found

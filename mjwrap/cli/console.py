@@ -1,0 +1,84 @@
+"""What every command is run by: its parser, errors in one line, exit codes, quiet libraries."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from typing import NoReturn
+
+from mjwrap.cli.errors import INTERRUPTED, RUN_FAILED, USER_ERROR, RunError, UserError
+from mjwrap.cli.output import Output
+from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
+
+_MYO_NOISE = (
+    "Attaching a spec with an empty prefix"  # myo_sim's models do that; it matters for saving them only
+)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, and whose help is a command's documentation, its examples last."""
+
+    def __init__(self, name: str, documentation: str) -> None:
+        what, mark, examples = documentation.partition("\nExamples:")
+        super().__init__(
+            prog=name,
+            description=what,
+            epilog=(mark + examples).strip() or None,
+            allow_abbrev=False,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+
+    def error(self, message: str) -> NoReturn:
+        """Print the message and stop."""
+        self.exit(USER_ERROR, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def run(name: str, body: Callable[[], int]) -> int:
+    """Run a command's body and return its exit code; errors become one line on standard error and a code.
+
+    2: the user can mend it; 1: the run failed; 130: Ctrl-C. Output files that are not finished are removed.
+    """
+    try:
+        with _quiet_mujoco(name):
+            return body()
+    except (UserError, ModelError, SignalError, GeometryError) as error:
+        return _say(name, error, USER_ERROR)
+    except (RunError, MjwrapError) as error:
+        return _say(name, error, RUN_FAILED)
+    except MemoryError:
+        return _say(name, "out of memory", RUN_FAILED)
+    except KeyboardInterrupt:
+        return _say(name, "stopped by Ctrl-C", INTERRUPTED)
+    except BrokenPipeError:  # whoever reads standard output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return RUN_FAILED
+    finally:
+        Output.discard_open()
+
+
+def _say(name: str, error: object, code: int) -> int:
+    print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+    return code
+
+
+@contextlib.contextmanager
+def _quiet_mujoco(name: str) -> Iterator[None]:
+    """Show each of MuJoCo's warnings once, on standard error, and leave no MUJOCO_LOG.TXT behind."""
+    import mujoco  # here, so that help needs none of it
+
+    seen: set[str] = set()
+
+    def show(text: str) -> None:
+        kind = text.split(".")[0]
+        if kind not in seen and not kind.startswith(_MYO_NOISE):
+            seen.add(kind)
+            print(f"{name}: MuJoCo warns: {' '.join(text.split())}", file=sys.stderr)
+
+    mujoco.set_mju_user_warning(show)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)

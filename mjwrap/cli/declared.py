@@ -1,0 +1,102 @@
+"""What a model declares, as a table and as values."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import mujoco
+
+from mjwrap.calibration.judge import as_unit
+from mjwrap.mjcf import MuscleDeclaration, Node, Route, name_of
+
+_HEAD = ("muscle", "law", "F_max [N]", "l_opt [mm]", "l_slack [mm]", "tendon", "path")
+_NUMBERS = (2, 3, 4)
+
+
+def table(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> str:
+    """Return a line for each muscle: law, sizes, and the sites and surfaces that it runs over.
+
+    l_opt, l_slack: optimal fibre and tendon slack length, for MuJoCo's law as its length range gives them.
+    """
+    rows: list[tuple[str, ...]] = [_HEAD]
+    for muscle in muscles:
+        unit = as_unit(muscle.parameters)
+        sizes = [_size(unit.peak, 1.0), _size(unit.optimal, 1e3), _size(unit.slack, 1e3)]
+        tendon = getattr(muscle.parameters, "tendon", "rigid" if muscle.law == "mujoco" else "")
+        path = " | ".join(_path(model, route) for route in muscle.routes)
+        rows.append((muscle.name, muscle.law, *sizes, tendon, path))
+    wide = [max(len(row[i]) for row in rows) for i in range(len(_HEAD) - 1)]
+    lines = []
+    for *cells, path in rows:
+        pairs = enumerate(zip(cells, wide, strict=True))
+        aligned = [cell.rjust(w) if i in _NUMBERS else cell.ljust(w) for i, (cell, w) in pairs]
+        lines.append("  ".join([*aligned, path]).rstrip())
+    return "\n".join(lines)
+
+
+def _size(value: float, scale: float) -> str:
+    return f"{scale * value:.4g}" if math.isfinite(value) else "-"
+
+
+def _path(model: mujoco.MjModel, route: Route) -> str:
+    stops = [_site(model, route.origin)]
+    for is_via, group in itertools.groupby(route.nodes, lambda node: node.surface is None):
+        nodes = list(group)
+        if is_via and len(nodes) > 1:
+            stops.append(f"{len(nodes)} via points")
+        else:
+            stops += [_stop(model, node) for node in nodes]
+    stops.append(_site(model, route.insertion))
+    return ("" if route.weight == 1.0 else f"{route.weight:g} × ") + " > ".join(stops)
+
+
+def _stop(model: mujoco.MjModel, node: Node) -> str:
+    if node.surface is None:
+        return _site(model, node.site)
+    side = f", side {_site(model, node.hint_site)}" if node.hint_site >= 0 else ""
+    return f"{_geom(model, node.geom)} ({type(node.surface).__name__.lower()}{side})"
+
+
+def _site(model: mujoco.MjModel, site: int) -> str:
+    return name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
+
+
+def _geom(model: mujoco.MjModel, geom: int) -> str:
+    return name_of(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
+
+
+def as_values(model: mujoco.MjModel, muscle: MuscleDeclaration) -> dict[str, Any]:
+    """Return a declaration as plain values: names of elements, parameters of the law, sizes of surfaces."""
+    kinds = mujoco.mjtObj
+    return {
+        "name": muscle.name,
+        "actuator": name_of(model, kinds.mjOBJ_ACTUATOR, muscle.actuator) if muscle.actuator >= 0 else None,
+        "tendon": name_of(model, kinds.mjOBJ_TENDON, muscle.tendon) if muscle.tendon >= 0 else None,
+        "law": muscle.law,
+        "parameters": asdict(muscle.parameters),  # pyright: ignore[reportArgumentType]
+        "activation_dynamics": asdict(muscle.activation),
+        "routes": [
+            {
+                "weight": route.weight,
+                "origin": _site(model, route.origin),
+                "stops": [_stop_values(model, node) for node in route.nodes],
+                "insertion": _site(model, route.insertion),
+            }
+            for route in muscle.routes
+        ],
+    }
+
+
+def _stop_values(model: mujoco.MjModel, node: Node) -> dict[str, Any]:
+    if node.surface is None:
+        return {"via_site": _site(model, node.site)}
+    return {
+        "geom": _geom(model, node.geom),
+        "surface": type(node.surface).__name__,
+        "sizes": list(node.surface.dims),
+        "side_site": _site(model, node.hint_site) if node.hint_site >= 0 else None,
+    }

@@ -1,0 +1,11 @@
+"""What ends a command early, and its exit codes."""
+
+FAULTS, RUN_FAILED, USER_ERROR, INTERRUPTED = 1, 1, 2, 130
+
+
+class UserError(Exception):
+    """Something that the user can mend; the message says what, and what exists instead."""
+
+
+class RunError(Exception):
+    """A run that could not be finished, through nobody's mistake on the command line."""

@@ -1,0 +1,66 @@
+"""The command `mjwrap`: which commands there are, and where each begins; a command's module loads when it is called."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+import mjwrap
+from mjwrap.cli import console
+from mjwrap.cli.errors import USER_ERROR
+
+COMMANDS = {
+    "run": "simulate a model with its muscles along geodesic paths",
+    "compare": "compare MuJoCo's built-in tendons with mjwrap's paths on the same model",
+    "inspect": "list the muscles of a model, what drives them, and which parameters are implausible",
+    "check": "check paths, moment arms, forces and energy on a model, pass or fail",
+    "replay": "look at a recording, or make one from a file of states",
+    "warmup": "compile everything now, so that no run has to",
+}
+HELP = """usage: mjwrap COMMAND ...
+       mjwrap COMMAND --help
+       mjwrap --version
+
+Geodesic muscles for MuJoCo.
+
+commands:
+{commands}
+
+MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes.
+
+Examples:
+  mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --plot elbow.png
+  mjwrap inspect models/elbow/elbow.xml
+  mjwrap check models/elbow/elbow.xml
+
+Exit codes: 0 done, 1 faults found or the run failed, 2 a mistake on the command line or in a file, 130 Ctrl-C.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; return its exit code, as `HELP` lists them."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    first = given[0] if given else "--help"
+    if first in ("-h", "--help"):
+        lines = (f"  {name:9s} {text}" for name, text in COMMANDS.items())
+        print(HELP.format(commands="\n".join(lines)), end="")
+        return 0 if given else USER_ERROR
+    if first == "--version":
+        print(f"mjwrap {mjwrap.__version__}")
+        return 0
+    if first not in COMMANDS:
+        kind = "option" if first.startswith("-") else "command"
+        print(
+            f"mjwrap: no {kind} '{first}'; commands: {', '.join(COMMANDS)} (see mjwrap --help)",
+            file=sys.stderr,
+        )
+        return USER_ERROR
+    return console.run(f"mjwrap {first}", lambda: _execute(first, given[1:]))
+
+
+def _execute(name: str, arguments: list[str]) -> int:
+    command = importlib.import_module(f"mjwrap.cli.{name}")
+    parser = console.Parser(f"mjwrap {name}", command.__doc__ or "")
+    command.add_arguments(parser)
+    return command.execute(parser.parse_args(arguments))

@@ -1,0 +1,60 @@
+"""While a command works: progress bars, Ctrl-C, and what has to be there before it begins."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from typing import Any
+
+from mjwrap.cli.errors import UserError
+
+
+class Interrupt:
+    """Ctrl-C asks a loop to end: look at `asked` once a turn. A second Ctrl-C stops at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __enter__(self) -> Interrupt:
+        self._before = signal.signal(signal.SIGINT, self._handle)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _handle(self, *_: object) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+
+def progress_bar(total: float, unit: str, label: str) -> Any:
+    """Return a bar with `update(n)` and `close()` that shows after two seconds, on a terminal only."""
+    if sys.stderr.isatty():
+        with contextlib.suppress(ImportError):
+            from tqdm import tqdm
+
+            form = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} {unit} [{elapsed}<{remaining}]"
+            return tqdm(total=total, unit=unit, desc=label, delay=2.0, leave=False, bar_format=form)
+    return _NoBar()
+
+
+class _NoBar:
+    def update(self, n: float) -> None:
+        """Do nothing."""
+
+    def set_description_str(self, text: str) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def need_matplotlib() -> None:
+    """Raise `UserError` before a run whose plot could not be drawn."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise UserError("--plot needs matplotlib: pip install 'mjwrap[demo]'") from None
+    matplotlib.use("Agg")

@@ -1,0 +1,138 @@
+"""Look at a recording, or at a file of states: in rerun's own viewer, in a browser, or say what it holds.
+
+FILE is a recording (.rrd), or a table of states over time (.sto, .mot, .csv, .npz) of the model that --model names.
+Its columns: qpos:JOINT, qvel:JOINT, act:ACTUATOR or activation:MUSCLE, as mjwrap run writes them; qpos[0] and so on;
+JOINT/value, JOINT/speed, MUSCLE/activation or just JOINT, as in OpenSim's files. An NPZ file may have arrays time,
+qpos, qvel and act instead. Paths and forces are computed again from them.
+
+Without an option the viewer opens, or where there is no display the recording is served to a browser.
+
+Examples:
+  mjwrap replay elbow.rrd
+  mjwrap replay elbow.rrd --info
+  mjwrap replay states.npz --model models/elbow/elbow.xml --record elbow.rrd
+  mjwrap replay ik.mot --model arm.xml --out paths.sto --columns length,moment_arm
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+from mjwrap.cli.errors import UserError
+from mjwrap.cli.output import Report, add_json
+from mjwrap.errors import RecordingError
+from mjwrap.recording import Summary, open_native, read_summary, serve
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which arguments there are."""
+    add = parser.add_argument
+    add("file", metavar="FILE", help="recording (.rrd), or table of states (.sto, .mot, .csv, .npz)")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        "--serve", action="store_true", help="serve it to a browser on this machine until Ctrl-C"
+    )
+    what.add_argument("--info", action="store_true", help="say what it holds, and stop")
+    add(
+        "--port",
+        type=port,
+        default=9090,
+        metavar="N",
+        help="where to serve: N and N + 1 (default %(default)s)",
+    )
+    states = parser.add_argument_group("for a table of states")
+    states.add_argument("--model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
+    states.add_argument("--keyframe", metavar="NAME", help="what the table does not name is as there")
+    states.add_argument("--record", metavar="FILE.rrd", help="keep the recording, and open no viewer")
+    states.add_argument("--out", metavar="FILE", help="paths and forces as a table; opens no viewer")
+    states.add_argument("--columns", default="length,velocity,tension", metavar="KINDS", help="what it holds, as "
+        "mjwrap run has it (default %(default)s)")  # fmt: skip
+    add_json(parser, "what --info says")
+
+
+def port(text: str) -> int:
+    """Return a port that has a next one, for argparse."""
+    number = int(text)
+    if not 0 < number < 65535:
+        raise argparse.ArgumentTypeError(f"{text} must lie between 1 and 65534")
+    return number
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Look at the whole file first, so that a damaged one is an error here and not an empty viewer."""
+    try:
+        if Path(options.file).suffix.lower() in (".sto", ".mot", ".csv", ".npz"):
+            return replay_states(options)
+        for option in ("model", "keyframe", "record", "out"):
+            if getattr(options, option):
+                raise UserError(f"--{option} goes with a table of states, and '{options.file}' is none")
+        return show(options, options.file)
+    except RecordingError as error:
+        raise UserError(str(error)) from None
+
+
+def show(options: argparse.Namespace, path: str) -> int:
+    """Say what a recording holds, or show it."""
+    summary = read_summary(path)
+    if options.info or options.json:
+        report = Report(options.json)
+        report.say(describe(summary))
+        report.finish({name: str(x) if isinstance(x, Path) else x for name, x in vars(summary).items()})
+        sys.stdout.flush()
+        return 0
+    if options.serve or not has_display():
+        return serve_until_stopped(path, options.port)
+    return open_native(path)
+
+
+def replay_states(options: argparse.Namespace) -> int:
+    """Record what the states of a table look like, and show it, unless it is only to be kept."""
+    from mjwrap.cli.replay_states import (
+        recompute,  # with MuJoCo and the kernels, which a recording does not need
+    )
+
+    if not options.model:
+        raise UserError(f"'{options.file}' is a table of states: --model says of which model")
+    if options.record or options.out:
+        recompute(options, options.record)
+        return 0
+    with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:
+        path = os.path.join(folder, f"{Path(options.file).stem}.rrd")
+        recompute(options, path)
+        return show(options, path)
+
+
+def describe(summary: Summary) -> str:
+    """What a recording holds, a fact a line."""
+    lines = [
+        f"file      {summary.path} ({summary.path.stat().st_size / 1e6:.1f} MB)",
+        f"model     {summary.model}",
+        f"time      {summary.start:g} s to {summary.end:g} s, {summary.states} states",
+        f"muscles   {len(summary.muscles)}: {', '.join(summary.muscles)}",
+        f"entities  {len(summary.entities)}:",
+    ]
+    return "\n".join(lines + [f"    {path}" for path in summary.entities])
+
+
+def has_display() -> bool:
+    """Whether a window can be opened."""
+    return sys.platform in ("darwin", "win32") or any(
+        os.environ.get(v) for v in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+
+
+def serve_until_stopped(path: str, number: int) -> int:
+    """Serve a recording until Ctrl-C or the end of the server."""
+    address, process = serve(path, number)
+    print(f"open {address}\nCtrl-C stops serving", flush=True)
+    try:
+        return process.wait()
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        process.terminate()
+        process.wait()

@@ -1,0 +1,248 @@
+"""Simulate any model with its muscles along geodesic paths.
+
+MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes.
+
+Excitation is a pattern for all muscles, NAME=PATTERN for those whose names match (* and ? stand for anything; any
+actuator may be named), or a table (.csv, .sto, .mot, .npz) with a column 'time' and one for each muscle or actuator
+that it drives. Several may be given; a later one wins. Patterns (times in s, amplitudes in the actuator's units, phase
+in turns):
+  constant:LEVEL                          step:LEVEL@TIME
+  sine:AMPLITUDE,HZ[,OFFSET[,PHASE]]      cosine:AMPLITUDE,HZ[,OFFSET[,PHASE]]
+  pulses[:PEAK[,PERIOD]]                  random[:SEED[,HOLD]]
+
+Examples:
+  mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --record elbow.rrd --plot elbow.png
+  mjwrap run models/elbow/elbow.xml --excitation controls.sto --out elbow.sto --columns length,tension,moment_arm
+  mjwrap run myo_sim:myoarm_r --mode wrench --excitation random:3 'DELT*=constant:0.5' --csv arm.csv --json
+  mjwrap run models/paper_case2/paper_case2.xml --duration 3 --prescribe cylinder_y=sine:0.02,1 --csv case2.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+
+from mjwrap import MuscleSystem, Recorder, Status, __version__
+from mjwrap.cli.arguments import at_least, positive
+from mjwrap.cli.engine import MODES, Engine, start_engine
+from mjwrap.cli.errors import INTERRUPTED, UserError
+from mjwrap.cli.history import History
+from mjwrap.cli.models import INTEGRATORS, set_state, start_keyframe
+from mjwrap.cli.output import Output, Report, add_json
+from mjwrap.cli.prescribe import Prescribed, check_free
+from mjwrap.cli.progress import Interrupt, need_matplotlib, progress_bar
+from mjwrap.cli.samples import KINDS, USUAL, Samples, choose_kinds
+from mjwrap.errors import RecordingError
+from mjwrap.excitation import Excitation
+from mjwrap.files import SUFFIXES
+
+Log = Callable[[mujoco.MjData], object]
+OUTPUTS = (("recording", "record"), ("plot", "plot"), ("csv", "csv"), ("table", "out"))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which arguments there are."""
+    add = parser.add_argument
+    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
+    add("--duration", type=positive, default=1.0, metavar="S", help="simulated time (default %(default)s s)")
+    add("--timestep", type=positive, metavar="S", help="instead of the model's")
+    add("--integrator", choices=INTEGRATORS, type=str.lower, help="instead of the model's")
+    add("--mode", default=MODES[0], metavar="MODE", help="what runs the muscles: python (default), step by step; or "
+        "the engine plugin, as mjwrap.install knows it: wrench, transmission")  # fmt: skip
+    several = {"nargs": "+", "action": "extend", "default": []}
+    add("--excitation", **several, metavar="PATTERN|NAME=PATTERN|FILE", help="see above")
+    add("--prescribe", **several, metavar="JOINT=PATTERN|FILE", help="joints that follow a constant, sine or cosine "
+        "[rad, m] or the columns of a table, whatever pulls at them")  # fmt: skip
+    add("--keyframe", metavar="NAME", help="start there")
+    add("--qpos", **several, metavar="JOINT=VALUE", help="start positions [rad, m]")
+    add(
+        "--seed",
+        type=at_least(0),
+        default=0,
+        metavar="N",
+        help="for the pattern 'random' (default %(default)s)",
+    )
+    add("--strict", action="store_true", help="stop where a muscle's path cannot be found")
+    add(
+        "--sample",
+        type=positive,
+        default=0.005,
+        metavar="S",
+        help="time between samples (default %(default)s s)",
+    )
+    add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
+    add(
+        "--plot",
+        metavar="FILE.png",
+        help="joints, activations, lengths and tensions over time (png, pdf, svg)",
+    )
+    add("--out", metavar="FILE", help=f"table over time, SI units ({', '.join(SUFFIXES)})")
+    add("--csv", metavar="FILE.csv", help="another table, or the only one, as CSV")
+    add("--columns", default=USUAL, metavar="KINDS", help="what the tables hold, of "
+        f"{', '.join(KINDS)} (default {USUAL})")  # fmt: skip
+    add_json(parser, "what was run, how fast, and what went wrong")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Set up, run, and say what happened and where the files are."""
+    engine = start_engine(options.model, options.mode, options.strict)
+    for model in {id(m): m for m in (engine.model, engine.muscles.model)}.values():
+        if options.timestep is not None:
+            model.opt.timestep = options.timestep
+        if options.integrator is not None:
+            model.opt.integrator = INTEGRATORS[options.integrator]
+    set_state(engine.model, engine.data, start_keyframe(engine.model, options.keyframe), options.qpos)
+    excitation = Excitation(engine.muscles, options.excitation, options.seed)
+    prescribed = Prescribed(engine.model, options.prescribe)
+    check_free(prescribed.joints, options.qpos, engine.model)
+    report = Report(options.json)
+    with contextlib.ExitStack() as stack:
+        logs, closes = open_outputs(options, engine, stack)
+        with Interrupt() as interrupt:
+            wall = advance(engine, excitation, prescribed, options, logs, interrupt)
+        for close in closes:
+            close()
+    tell(report, options, engine, wall)
+    report.finish(facts(options, engine, wall, interrupt.asked))
+    if interrupt.asked:
+        print("mjwrap run: stopped by Ctrl-C; the files hold what was simulated", file=sys.stderr)
+        return INTERRUPTED
+    return 0
+
+
+def open_outputs(
+    options: argparse.Namespace, engine: Engine, stack: contextlib.ExitStack
+) -> tuple[list[Log], list[Callable[[], None]]]:
+    """Open every file that was asked for: what to call at each sample, and what at the end.
+
+    A place that cannot be written shows here, before the run. What has to be closed in any case goes on `stack`.
+    """
+    model, muscles = engine.muscles.model, engine.muscles
+    logs: list[Log] = []
+    closes: list[Callable[[], None]] = []
+    kinds = choose_kinds(options.columns)
+    plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
+    tables = [Output(options.csv, "--csv", (".csv",))] if options.csv else []
+    tables += [Output(options.out, "--out", SUFFIXES)] if options.out else []
+    if plot is not None:
+        need_matplotlib()
+    for output in tables:
+        samples = Samples(output, model, muscles, kinds)
+        logs.append(samples.log)
+        closes.append(samples.close)
+    if options.record:
+        logs.append(stack.enter_context(_recorder(model, muscles, options.record)).log)
+    if plot is not None:
+        history = History(muscles)
+        logs.append(history.log)
+
+        def draw() -> None:
+            from mjwrap.cli.plot_run import plot_run
+
+            plot_run(plot, f"{Path(options.model).name}, {engine.data.time:.4g} s", model, muscles, history)
+
+        closes.append(draw)
+    return logs, closes
+
+
+def _recorder(model: mujoco.MjModel, muscles: MuscleSystem, path: str) -> Recorder:
+    """Return a recorder; what is wrong with its place is the user's to mend."""
+    try:
+        return Recorder(model, muscles, path)
+    except RecordingError as error:
+        raise UserError(str(error)) from None
+
+
+def advance(
+    engine: Engine, excitation: Excitation, prescribed: Prescribed, options: argparse.Namespace, logs: list[Log],
+    interrupt: Interrupt,
+) -> float:  # fmt: skip
+    """Run for the asked duration or until Ctrl-C; return the wall time [s]."""
+    data, muscles, timestep = engine.data, engine.muscles, float(engine.model.opt.timestep)
+    steps = max(1, math.ceil(options.duration / timestep - 1e-6))
+    stride = max(1, round(options.sample / timestep))
+    prescribed.place(data)
+    excitation.write(data)
+    engine.look()  # compiles where that is still to do, before the clock starts
+    inside = [i for i, status in enumerate(muscles.status) if status == Status.ENDPOINT_INSIDE]
+    for i in inside[:1]:
+        raise UserError(f"muscle '{muscles.names[i]}' has no path at the start: {muscles.reason(i)}")
+    started = time.perf_counter()
+    bar = progress_bar(steps * timestep, "s", "simulating")
+    try:
+        for k in range(steps):
+            if k % stride == 0:
+                sample(engine, logs)
+                bar.update(0.0 if k == 0 else stride * timestep)
+            if interrupt.asked:
+                break
+            prescribed.drive(data)
+            engine.step()
+            prescribed.place(data)
+            excitation.write(data)
+        else:
+            sample(engine, logs)
+    finally:
+        bar.close()
+    return time.perf_counter() - started
+
+
+def sample(engine: Engine, logs: list[Log]) -> None:
+    """Log the present state, muscles included."""
+    if logs:
+        engine.look()
+        for log in logs:
+            log(engine.seen)
+
+
+def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: float) -> None:
+    """Say what was run, how fast, what went wrong, and where the files are."""
+    muscles, simulated = engine.muscles, engine.data.time
+    s, mode = "s" * (muscles.n != 1), "" if options.mode == MODES[0] else f", plugin mode {options.mode}"
+    step = f"{_integrator(engine.model)}, time step {1e3 * engine.model.opt.timestep:g} ms"
+    report.say(f"{options.model}: {muscles.n} muscle{s}, {step}{mode}")
+    report.say(
+        f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
+    )
+    if muscles.native:
+        report.say(f"{len(muscles.native)} stay with MuJoCo's own tendons:")
+        for name, reason in muscles.native.items():
+            report.say(f"  {name}: {reason}")
+    failed = engine.failures()
+    if failed:
+        report.say("paths not found (the last good force was held):")
+        for name, why in failed.items():
+            report.say(f"  {name}: {why}")
+    for what, option in OUTPUTS:
+        if getattr(options, option):
+            report.say(f"{what + ':':10s} {getattr(options, option)}")
+
+
+def facts(options: argparse.Namespace, engine: Engine, wall: float, stopped: bool) -> dict[str, object]:
+    """Return the same as values."""
+    return {
+        "model": options.model,
+        "mjwrap": __version__,
+        "mujoco": mujoco.__version__,
+        "mode": options.mode,
+        "muscles": engine.muscles.names,
+        "native": engine.muscles.native,
+        "integrator": _integrator(engine.model),
+        "timestep": float(engine.model.opt.timestep),
+        "simulated": float(engine.data.time),
+        "wall": wall,
+        "stopped_by_ctrl_c": stopped,
+        "paths_not_found": engine.failures(),
+        "files": {what: getattr(options, option) for what, option in OUTPUTS if getattr(options, option)},
+    }
+
+
+def _integrator(model: mujoco.MjModel) -> str:
+    return mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_").lower()

@@ -1,0 +1,149 @@
+"""Compile everything now, so that no run has to wait for it: paths, muscles, and the engine plugin inside MuJoCo.
+
+The machine code is kept for this user, this version of mjwrap and of numba; a second call finds it there. With MODEL,
+the model is evaluated too, with whatever else it asks for.
+
+Examples:
+  mjwrap warmup
+  mjwrap warmup models/elbow/elbow.xml --json
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numba.core import event
+
+import mjwrap as mw
+from mjwrap.cli.models import load
+from mjwrap.cli.output import Report, add_json
+from mjwrap.errors import VersionError
+from mjwrap.kernels import _jit
+
+SCENE = """
+<mujoco>
+  <worldbody>
+    <geom name="ball" type="ellipsoid" size=".05 .04 .06" contype="0" conaffinity="0"/>
+    <site name="origin" pos="-.2 0 .01"/>
+    <body>
+      <joint name="slide" type="slide" axis="1 0 0"/>
+      <geom type="sphere" size=".01" pos=".2 0 0" mass="1" contype="0" conaffinity="0"/>
+      <site name="insertion" pos=".2 0 0"/>
+    </body>
+  </worldbody>
+  <tendon><spatial name="line"><site site="origin"/><site site="insertion"/></spatial></tendon>
+  <actuator><muscle name="muscle" tendon="line" lengthrange=".2 .6"/></actuator>
+  <custom>
+    <tuple name="mjwrap_muscle">
+      <element objtype="actuator" objname="muscle"/>
+      <element objtype="site" objname="origin"/><element objtype="geom" objname="ball"/>
+      <element objtype="site" objname="insertion"/>
+    </tuple>
+  </custom>
+</mujoco>
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which arguments there are."""
+    parser.add_argument("model", nargs="?", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
+    add_json(parser, "what was compiled, how long it took, and where it is kept")
+
+
+class _Count(event.Listener):
+    """Counts the functions that are compiled rather than loaded."""
+
+    def __init__(self) -> None:
+        self.compiled = 0
+
+    def on_start(self, event: Any) -> None:
+        self.compiled += 1
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Compile, and say what was done and where the machine code lies."""
+    report = Report(options.json)
+    model = load(options.model) if options.model else None
+    count = _Count()
+    event.register("numba:compile", count)
+    steps: dict[str, Callable[[], object]] = {"paths": paths, "muscles": muscles, "plugin": plugin}
+    if model is not None:
+        steps[options.model] = lambda: evaluate(model)
+    parts = []
+    try:
+        for name, step in steps.items():
+            before, started = count.compiled, time.perf_counter()
+            left_out = step()
+            seconds = time.perf_counter() - started
+            part = {
+                "part": name,
+                "compiled": count.compiled - before,
+                "seconds": seconds,
+                "left_out": left_out,
+            }
+            told = left_out or f"{part['compiled']} functions compiled"
+            report.say(f"{name}: {told}, {seconds:.1f} s")
+            parts.append(part)
+    finally:
+        event.unregister("numba:compile", count)
+    folder = Path(_jit._CACHE)
+    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    report.say(f"{'compiled' if count.compiled else 'nothing to compile'}; {size / 1e6:.0f} MB in {folder}")
+    report.finish({"parts": parts, "compiled": count.compiled, "folder": str(folder), "bytes": size})
+    return 0
+
+
+def paths() -> None:
+    """Solve a path and a sweep, and everything that a path is asked for."""
+    row = [mw.Obstacle(mw.Cylinder(0.03), hint=(0.0, 0.03, 0.0)), mw.ViaPoint((-0.06, 0.01, 0.01))]
+    ends = (0.1, 0.01, 0.0), (-0.2, 0.0, 0.02)
+    path = mw.solve_path(*ends, row)
+    path.speed((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), np.zeros((2, 6)))
+    path.wrenches(5.0)
+    path.points(0.01)
+    path.gradient()
+    path.stiffness()
+    places = np.tile([[0.0, 0.0, 0.0], [-0.06, 0.01, 0.01]], (2, 1, 1))
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (2, 2, 1))
+    mw.solve_sweep(*ends, row, places, turns)
+
+
+def muscles() -> None:
+    """Evaluate and step a MuscleSystem, and draw one muscle on the bench."""
+    evaluate(mujoco.MjModel.from_xml_string(SCENE))
+    law = mw.DeGrooteFregly2016(500.0, 0.1, 0.2, tendon="elastic")
+    mw.simulate_muscle(law, [0.0, 0.01, 0.02], 0.3, excitation=0.5)
+
+
+def evaluate(model: mujoco.MjModel) -> None:
+    """Evaluate, step, differentiate and draw the muscles of a model."""
+    system, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    system.step(data)
+    mujoco.mj_resetData(model, data)
+    system.reset(data)
+    system.apply(data)
+    system.length_jacobian(data)
+    system.polylines()
+    system.contacts()
+    system.energetics(mw.Umberger2010())
+    if not system.status.any():
+        system.length_jacobian_rate(data)
+
+
+def plugin() -> str:
+    """Run a model by the engine plugin; return why that cannot be, or an empty string."""
+    try:
+        model = mw.install(mujoco.MjSpec.from_string(SCENE))
+    except VersionError as error:
+        return f"left out: {error}"
+    mujoco.mj_step(model, mujoco.MjData(model))
+    return ""

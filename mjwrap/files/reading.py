@@ -1,0 +1,158 @@
+"""Reading tables over time, with errors that say where in the file something is wrong."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from mjwrap.errors import TableError
+from mjwrap.files.table import SUFFIXES, Table, check_names
+
+Row = tuple[int, list[str]]  # line number, cells
+
+
+def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
+    """Read a table over time: .sto or .mot of OpenSim, .npz, else comma-separated values.
+
+    finite: refuse what is not finite. A CSV file has a header with `time` [s] and names; an NPZ file has `time` (T,),
+    and either `columns` and `values`, as `write_table` leaves it, or an array (T,) for each column, or (T, k) for
+    columns called name[0] to name[k − 1]. Numbers are those of the file: `Table.in_degrees` says whether rotations
+    are in degrees. `TableError` names file, line and column of the first thing that is wrong.
+    """
+    name = os.fspath(path)
+    suffix = Path(name).suffix.lower()
+    if suffix == ".npz":
+        table = _read_npz(name)
+        if finite and not np.isfinite(table.values).all():
+            k, column = (int(x[0]) for x in np.nonzero(~np.isfinite(table.values)))
+            raise TableError(f"'{name}' row {k + 1}, column '{table.names[column]}': not finite")
+        return table
+    text = _read_text(name)
+    return _read_opensim(name, text, finite) if suffix in (".sto", ".mot") else _read_csv(name, text, finite)
+
+
+def _read_text(name: str) -> str:
+    try:
+        return Path(name).read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise TableError(f"cannot read '{name}': {(error.strerror or str(error)).lower()}") from None
+    except UnicodeDecodeError:
+        raise TableError(f"'{name}' is not a text file; tables end in {', '.join(SUFFIXES)}") from None
+
+
+def _read_csv(name: str, text: str, finite: bool) -> Table:
+    try:
+        numbered = enumerate(csv.reader(io.StringIO(text, newline="")), 1)
+        rows = [row for row in numbered if any(cell.strip() for cell in row[1])]
+    except csv.Error:
+        raise TableError(f"'{name}' is not a text file with comma-separated values") from None
+    if not rows:
+        raise TableError(f"'{name}' is empty; wanted: a header with 'time' and names, then rows of numbers")
+    return _table(name, [cell.strip() for cell in rows[0][1]], rows[1:], {}, finite)
+
+
+def _read_opensim(name: str, text: str, finite: bool) -> Table:
+    """Read a .sto or .mot file: a header up to `endheader`, a line of names, rows; version 1, 3, or SIMM's."""
+    lines = text.splitlines()
+    end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
+    if end is None:
+        raise TableError(f"'{name}' has no line 'endheader', which ends the header of OpenSim's files")
+    metadata = _header(lines[:end])
+    kind = metadata.get("DataType", "double")
+    if kind.lower() != "double":
+        raise TableError(f"'{name}' holds {kind} in its cells; only DataType=double can be read")
+    rest = [(i, line) for i, line in enumerate(lines[end + 1 :], end + 2) if line.strip()]
+    if not rest:
+        raise TableError(f"'{name}' has no line of names after 'endheader'")
+    first = rest[0][1]
+    header = [cell.strip() for cell in (first.rstrip("\t").split("\t") if "\t" in first else first.split())]
+    table = _table(name, header, [(i, line.split()) for i, line in rest[1:]], metadata, finite)
+    for keys, found in ((("nRows", "datarows"), len(table.time)), (("nColumns", "datacolumns"), len(header))):
+        said = next((metadata[key] for key in keys if key in metadata), str(found))
+        if not said.isdigit() or int(said) != found:
+            raise TableError(
+                f"'{name}': its header says {keys[0]}={said}, but there are {found}: is it cut short?"
+            )
+    return table
+
+
+def _header(lines: list[str]) -> dict[str, str]:
+    """Return what a header says: "key=value", SIMM's "key value", and the first line as the name."""
+    found: dict[str, str] = {}
+    for line in lines:
+        key, equals, value = (part.strip() for part in line.partition("="))
+        if equals:
+            found[key] = value
+        elif line.split()[:1] and line.split()[0] in ("datacolumns", "datarows", "range"):
+            key, _, value = line.strip().partition(" ")
+            found[key] = value.strip()
+        elif key and not found:
+            found["header"] = key
+    return found
+
+
+def _table(name: str, header: list[str], rows: list[Row], metadata: dict[str, str], finite: bool) -> Table:
+    places = [i for i, cell in enumerate(header) if cell.lower() == "time"]
+    if not places:
+        raise TableError(f"'{name}' has no column 'time' [s]; its columns: {', '.join(header)}")
+    check_names(header, f"'{name}': ")
+    if not rows:
+        raise TableError(f"'{name}' has a header but no rows")
+    numbers = np.array([_numbers(name, line, header, cells, finite) for line, cells in rows])
+    time = numbers[:, places[0]]
+    for k in np.flatnonzero(~(np.diff(time) > 0.0)):
+        line = rows[int(k) + 1][0]
+        raise TableError(f"'{name}' line {line}: time {time[k + 1]:g} does not come after {time[k]:g}")
+    names = tuple(cell for i, cell in enumerate(header) if i != places[0])
+    return Table(time.copy(), names, np.delete(numbers, places[0], axis=1), metadata, name)
+
+
+def _numbers(name: str, line: int, header: list[str], row: list[str], finite: bool) -> list[float]:
+    if len(row) != len(header):
+        raise TableError(f"'{name}' line {line}: {len(row)} cells where the header has {len(header)}")
+    values = []
+    for column, cell in zip(header, row, strict=True):
+        try:
+            value = float(cell)
+        except ValueError:
+            raise TableError(
+                f"'{name}' line {line}, column '{column}': {cell.strip()!r} is not a number"
+            ) from None
+        if not math.isfinite(value) and (finite or column.lower() == "time"):
+            raise TableError(f"'{name}' line {line}, column '{column}': {cell.strip()} is not finite")
+        values.append(value)
+    return values
+
+
+def _read_npz(name: str) -> Table:
+    try:
+        with np.load(name, allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+    except OSError as error:
+        raise TableError(f"cannot read '{name}': {(error.strerror or str(error)).lower()}") from None
+    except (ValueError, zipfile.BadZipFile, EOFError, AttributeError) as error:
+        raise TableError(f"'{name}' is not an NPZ file of plain arrays: {error}") from None
+    if "time" not in arrays:
+        raise TableError(f"'{name}' has no array 'time' [s]; its arrays: {', '.join(arrays) or 'none'}")
+    time = arrays.pop("time")
+    metadata = {key[9:]: str(arrays.pop(key)) for key in list(arrays) if key.startswith("metadata.")}
+    if {"columns", "values"} <= arrays.keys():
+        values, names = arrays["values"], tuple(str(cell) for cell in np.atleast_1d(arrays["columns"]))
+    else:
+        names, columns = [], []
+        for key, array in arrays.items():
+            if array.ndim not in (1, 2) or array.shape[0] != time.shape[0] or array.dtype.kind not in "fiub":
+                what = f"{array.dtype} of shape {array.shape}"
+                raise TableError(
+                    f"'{name}': array '{key}' is {what}; wanted: numbers, a row for each of {time.shape}"
+                )
+            names += [key] if array.ndim == 1 else [f"{key}[{i}]" for i in range(array.shape[1])]
+            columns.append(array.reshape(len(array), -1))
+        values = np.hstack(columns) if columns else np.empty((time.shape[0], 0))
+    return Table(time, tuple(names), values, metadata, name)

@@ -1,0 +1,66 @@
+"""One table over time, whatever file it comes from or goes to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import TableError
+
+Array = NDArray[np.float64]
+SUFFIXES = (".sto", ".mot", ".csv", ".npz")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of numbers over time: time (T,) [s], increasing; names (n,), each its own; values (T, n).
+
+    metadata: what the header of a .sto or .mot file says; source: the file that it was read from. `TableError` where
+    these do not fit together. `table["name"]` is a column (T,).
+    """
+
+    time: Array
+    names: tuple[str, ...]
+    values: Array
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        where = f"'{self.source}': " if self.source else ""
+        time, values = np.asarray(self.time, dtype=np.float64), np.asarray(self.values, dtype=np.float64)
+        names = tuple(self.names)
+        if time.ndim != 1 or values.shape != (len(time), len(names)):
+            raise TableError(
+                f"{where}times of shape {time.shape} and {len(names)} names do not fit values of shape {values.shape}"
+            )
+        check_names(names, where)
+        late = np.flatnonzero(~(np.diff(time) > 0.0))
+        if not np.isfinite(time).all() or late.size:
+            k = int(late[0]) + 1 if late.size else int(np.flatnonzero(~np.isfinite(time))[0])
+            raise TableError(
+                f"{where}times must be finite and increase; time {time[k]:g} in row {k + 1} does not"
+            )
+        for name, value in (("time", time), ("names", names), ("values", values)):
+            object.__setattr__(self, name, value)
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.names:
+            where = f"'{self.source}' has " if self.source else ""
+            raise TableError(f"{where}no column '{name}'; columns: {', '.join(self.names) or 'none'}")
+        return self.values[:, self.names.index(name)]
+
+    @property
+    def in_degrees(self) -> bool:
+        """Whether the header says that rotations are in degrees."""
+        return self.metadata.get("inDegrees", "no").strip().lower() in ("yes", "true", "1")
+
+
+def check_names(names: Sequence[str], where: str = "") -> None:
+    """Raise `TableError` for columns without a name of their own."""
+    double = sorted({name for name in names if names.count(name) > 1})
+    if double or "" in names:
+        which = ", ".join(name for name in double if name) or "the blank ones"
+        raise TableError(f"{where}every column needs a name of its own; look at {which}")

@@ -1,0 +1,102 @@
+"""Writing tables over time: whole, or row by row while a run goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from mjwrap.errors import TableError
+from mjwrap.files.table import SUFFIXES, Array, Table, check_names
+
+_DIGITS = 12  # room for the number of rows, which is known at the end
+
+
+def write_table(path: str | os.PathLike[str], table: Table) -> None:
+    """Write a table as its suffix says: .sto or .mot of OpenSim (version 3), .csv, .npz; whole or not at all.
+
+    Numbers are written in full precision. CSV has no place for metadata. `TableError` where that place cannot be
+    written, or a name cannot stand in such a file.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in SUFFIXES:
+        raise TableError(f"'{file}': the name of a table must end in {', '.join(SUFFIXES)}")
+    part = file.with_name(f".{file.stem}.{uuid.uuid4().hex[:8]}.part{file.suffix}")
+    try:
+        if file.suffix.lower() == ".npz":
+            save_npz(part, table)
+        else:
+            with part.open("w", encoding="utf-8", newline="") as out:
+                writer = RowWriter(out, file.suffix, table.names, table.metadata)
+                for time, row in zip(table.time.tolist(), table.values.tolist(), strict=True):
+                    writer.add(time, row)
+                writer.finish()
+        os.replace(part, file)
+    except OSError as error:
+        raise TableError(f"cannot write '{file}': {(error.strerror or str(error)).lower()}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def save_npz(path: Path, table: Table) -> None:
+    """Write a table as arrays `time`, `columns` and `values`, and its metadata as `metadata.KEY`."""
+    metadata: dict[str, Any] = {f"metadata.{key}": np.array(value) for key, value in table.metadata.items()}
+    np.savez_compressed(
+        path, time=table.time, columns=np.array(table.names, dtype=str), values=table.values, **metadata
+    )
+
+
+class RowWriter:
+    """Writes the rows of a .sto, .mot or .csv file as they come, into a text file that can be rewound."""
+
+    def __init__(
+        self, file: IO[str], suffix: str, names: Sequence[str], metadata: Mapping[str, str] | None = None
+    ) -> None:
+        self._file, self._rows, self._place = file, 0, -1
+        check_names(["time", *names])
+        if suffix.lower() == ".csv":
+            self._between = ","
+            file.write(",".join(map(_quoted, ("time", *names))) + "\n")
+            return
+        self._between = "\t"
+        for name in names:
+            if any(c in name for c in "\t\r\n"):
+                raise TableError(f"column {name!r}: a name in OpenSim's files has no tabs and no line ends")
+        given = dict(metadata or {})
+        file.write(_line(given.pop("header", "mjwrap")) + "\n")
+        for key in ("nRows", "nColumns", "datarows", "datacolumns", "range", "version", "DataType"):
+            given.pop(key, None)
+        file.write("version=3\nDataType=double\nnRows=")
+        self._place = file.tell()
+        file.write(f"{0:0{_DIGITS}d}\nnColumns={len(names) + 1}\ninDegrees={given.pop('inDegrees', 'no')}\n")
+        file.writelines(f"{_line(key)}={_line(value)}\n" for key, value in given.items())
+        file.write("endheader\n" + "\t".join(("time", *names)) + "\n")
+
+    def add(self, time: float, row: Iterable[float] | Array) -> None:
+        """Write a row: time [s] and a number for each name, as many digits as it takes to read the same number back."""
+        numbers = row.tolist() if isinstance(row, np.ndarray) else row
+        self._file.write(self._between.join(map(repr, (float(time), *numbers))) + "\n")
+        self._rows += 1
+
+    def finish(self) -> None:
+        """Put the number of rows into the header."""
+        if self._place >= 0:
+            end = self._file.tell()
+            self._file.seek(self._place)
+            self._file.write(f"{self._rows:0{_DIGITS}d}")
+            self._file.seek(end)
+        self._file.flush()
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\r\n') else name
+
+
+def _line(text: str) -> str:
+    return " ".join(str(text).split())
