@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from typing import NoReturn
 
@@ -42,7 +43,7 @@ def run(name: str, body: Callable[[], int]) -> int:
     2: the user can mend it; 1: the run failed; 130: Ctrl-C. Output files that are not finished are removed.
     """
     try:
-        with _quiet_mujoco(name):
+        with _quiet(name):
             return body()
     except (UserError, ModelError, SignalError, GeometryError) as error:
         return _say(name, error, USER_ERROR)
@@ -65,8 +66,8 @@ def _say(name: str, error: object, code: int) -> int:
 
 
 @contextlib.contextmanager
-def _quiet_mujoco(name: str) -> Iterator[None]:
-    """Show each of MuJoCo's warnings once, on standard error, and leave no MUJOCO_LOG.TXT behind."""
+def _quiet(name: str) -> Iterator[None]:
+    """Show each warning once, in a line on standard error, and leave no MUJOCO_LOG.TXT behind."""
     import mujoco  # here, so that help needs none of it
 
     seen: set[str] = set()
@@ -75,10 +76,13 @@ def _quiet_mujoco(name: str) -> Iterator[None]:
         kind = text.split(".")[0]
         if kind not in seen and not kind.startswith(_MYO_NOISE):
             seen.add(kind)
-            print(f"{name}: MuJoCo warns: {' '.join(text.split())}", file=sys.stderr)
+            print(f"{name}: warning: {' '.join(text.split())}", file=sys.stderr)
 
     mujoco.set_mju_user_warning(show)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=_MYO_NOISE)
+            warnings.showwarning = lambda message, *_: show(str(message))
+            yield
     finally:
         mujoco.set_mju_user_warning(None)

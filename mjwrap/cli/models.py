@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -41,10 +40,8 @@ def load_spec(source: str) -> mujoco.MjSpec:
     known = sorted({*myo_sim.REGISTRY, *myo_sim._composed_models()})
     if name not in known:
         raise UserError(f"myo_sim has no model '{name}'; it has: {', '.join(known)}")
-    with warnings.catch_warnings():  # of its own making, about saving the model as XML
-        warnings.simplefilter("ignore")
-        postures = {"postures": True} if myo_sim.list_postures(name) else None
-        spec: Any = myo_sim.load_spec(name, build_kwargs=postures)
+    postures = {"postures": True} if myo_sim.list_postures(name) else None
+    spec: Any = myo_sim.load_spec(name, build_kwargs=postures)
     return spec
 
 

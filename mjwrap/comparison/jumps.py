@@ -1,4 +1,4 @@
-"""Jumps of length or slope along a sweep: told from a steep stretch by halving the step until only a jump is left."""
+"""Jumps of length or slope of both programs along a sweep."""
 
 from __future__ import annotations
 
@@ -11,16 +11,10 @@ from numpy.typing import NDArray
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
 from mjwrap.comparison.verdict import slope
+from mjwrap.continuity import NARROW, Probe, odd_intervals, refine_jump
 from mjwrap.poses import Motion, PoseMaker
 
 Array = NDArray[np.float64]
-Probe = Callable[[float], tuple[float, float]]  # place in the sweep -> length, slope
-
-LENGTH = 1e-6  # [m] smallest jump in length that is told
-SLOPE = 1e-5  # [m/rad] smallest jump in slope that is told
-NARROW = 1e-9  # of the sweep's range: the width at which a jump is told from a steep stretch
-LASTING = 0.5  # a jump keeps this share of its size while the width shrinks a thousandfold
-MOST = 3  # intervals looked into, for each muscle, sweep and kind
 
 
 @dataclass(frozen=True)
@@ -53,14 +47,14 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
                 continue
             good = np.ones(len(motion.at), dtype=np.bool_) if program == "MuJoCo" else twin.status == 0
             seen: list[float] = []
-            for k, bend in _candidates(motion, record, good):
+            for k, bend in odd_intervals(motion.at, record.length, slope(record, motion), good):
                 probe = (
                     _native_probe(comparer, twin, place)
                     if program == "MuJoCo"
                     else _mjwrap_probe(comparer, twin, place, motion, k, poses.base)
                 )
                 ends = float(motion.at[k]), float(motion.at[k + 1])
-                jump = _refine(probe, *ends, float(np.ptp(motion.at)), bend)
+                jump = refine_jump(probe, *ends, float(np.ptp(motion.at)), bend)
                 if jump is None or any(abs(jump[0] - other) < 1e-6 for other in seen):
                     continue
                 seen.append(jump[0])
@@ -79,54 +73,6 @@ def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
     )
     has_path = twin.mjwrap is not None and not twin.status[k - 1 : k + 1].any()
     return replace(jump, other_smooth=has_path and not jumps_too)
-
-
-def _candidates(
-    motion: Motion, record: PathRecord, good: NDArray[np.bool_]
-) -> list[tuple[int, float | None]]:
-    """Return the intervals in which length (None) or slope (its usual bend) change as a smooth curve would not."""
-    h, m, l = np.diff(motion.at), slope(record, motion), record.length
-    whole = good[1:] & good[:-1]
-    rest = np.where(whole, np.abs(np.diff(l) - 0.5 * h * (m[1:] + m[:-1])), 0.0)
-    turn = np.where(whole, np.abs(np.diff(m)), 0.0)
-    beside = np.maximum(np.append(turn[1:], 0.0), np.insert(turn[:-1], 0, 0.0))
-    bends = 0.5 * (np.append(np.diff(m)[1:], 0.0) + np.insert(np.diff(m)[:-1], 0, 0.0)) / h
-    odd_lengths = [int(k) for k in np.argsort(-rest)[:MOST] if rest[k] > 0.5 * LENGTH]
-    odd_slopes = [int(k) for k in np.argsort(-turn)[:MOST] if turn[k] > 2.0 * beside[k] + SLOPE]
-    found: list[tuple[int, float | None]] = [(k, None) for k in odd_lengths]
-    return found + [(k, float(bends[k])) for k in odd_slopes]
-
-
-def _refine(
-    probe: Probe, low: float, high: float, span: float, bend: float | None
-) -> tuple[float, float, float] | None:
-    """Halve an interval towards its jump; return (place, jump in length, jump in slope), or None if it is smooth.
-
-    bend: None: follow the half whose length disobeys its slopes more; a number: follow the larger change of slope, less
-    `bend` times the width, which is how the slope changes beside the interval.
-    """
-    (l0, m0), (l1, m1) = probe(low), probe(high)
-    wide: tuple[float, float] | None = None
-    while high - low > NARROW * span:
-        middle = 0.5 * (low + high)
-        lm, mm = probe(middle)
-        half = 0.5 * (middle - low)
-        left, right = abs(lm - l0 - half * (m0 + mm)), abs(l1 - lm - half * (mm + m1))
-        if bend is not None:
-            left, right = abs(mm - m0 - 2.0 * half * bend), abs(m1 - mm - 2.0 * half * bend)
-        if left >= right:
-            high, l1, m1 = middle, lm, mm
-        else:
-            low, l0, m0 = middle, lm, mm
-        smooth = abs(l1 - l0) < LENGTH if bend is None else abs(m1 - m0 - 2.0 * half * bend) < SLOPE
-        if smooth:
-            return None
-        if wide is None and high - low < 1e3 * NARROW * span:
-            wide = abs(l1 - l0), abs(m1 - m0)
-    assert wide is not None
-    length = l1 - l0 if abs(l1 - l0) >= max(LENGTH, LASTING * wide[0]) else 0.0
-    turn = m1 - m0 if abs(m1 - m0) >= max(SLOPE, LASTING * wide[1]) else 0.0
-    return (0.5 * (low + high), length, turn) if length or turn else None
 
 
 def _native_probe(comparer: Comparer, twin: Twin, place: Callable[[float], tuple[Array, Array]]) -> Probe:

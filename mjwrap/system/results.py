@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import coupling, drawing, segments
+from mjwrap.kernels import coupling, drawing, layout, segments
 from mjwrap.mjcf import Declarations, MuscleDeclaration
 from mjwrap.paths import Status
 from mjwrap.plan import Plan
@@ -67,6 +67,13 @@ class Results:
     def status(self) -> NDArray[np.int64]:
         """Codes of `mjwrap.Status` (n,)."""
         return self._last.status.copy()
+
+    @property
+    def tangency_error(self) -> Array:
+        """Tangency errors (n,): the largest of each muscle's routes, 0 where it touches no surface."""
+        found = np.zeros(self.n)
+        np.maximum.at(found, self._plan.routes[:, coupling.R_MUSCLE], self._last.info[:, layout.I_ERROR])
+        return found
 
     @property
     def time(self) -> float:

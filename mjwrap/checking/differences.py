@@ -1,0 +1,70 @@
+"""Lengths at poses around a pose, and what their differences say of l̇ and ∂l/∂q."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+WIDTHS = tuple(
+    2.0**-k for k in range(8, 14)
+)  # of central differences: rad, or muscle lengths where something slides
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+class Neighbourhood:
+    """The lengths of all muscles around a pose, on the branches that they have there."""
+
+    def __init__(self, muscles: MuscleSystem, data: mujoco.MjData) -> None:
+        self._muscles, self._data = muscles, data
+        self._qpos = data.qpos.copy()
+        muscles.forward(data)
+        self._branch = muscles.branch(data)
+        self._touched = self._contacts()
+        self._bad = muscles.status != 0
+        self._turns = muscles.model.jnt_type[muscles.model.dof_jntid] == _HINGE
+        self._size = min(1.0, float(np.median(muscles.length)))
+
+    def _contacts(self) -> NDArray[np.int64]:
+        return np.diff(self._muscles.contacts()[1])
+
+    def _length(self, direction: Array, step: float) -> Array:
+        """Return lengths (n,) a step away, NaN where a path touches other surfaces there, or is not found."""
+        muscles, data = self._muscles, self._data
+        data.qpos[:] = self._qpos
+        mujoco.mj_integratePos(muscles.model, data.qpos, direction, step)
+        muscles.set_branch(data, self._branch)
+        muscles.forward(data)
+        other = self._bad | (muscles.status != 0) | (self._contacts() != self._touched)
+        return np.where(other, np.nan, muscles.length)
+
+    def central(self, direction: Array) -> Array:
+        """Return central differences (widths, n) of the lengths along a direction (nv,)."""
+        slides = (direction != 0.0)[~self._turns].any()
+        widths = [h * (self._size if slides else 1.0) for h in WIDTHS]
+        found = [(self._length(direction, h) - self._length(direction, -h)) / (2.0 * h) for h in widths]
+        self._data.qpos[:] = self._qpos
+        self._muscles.set_branch(self._data, self._branch)
+        return np.array(found)
+
+
+def extrapolated_error(central: Array, claimed: Array) -> Array:
+    """Return the smallest error (n,) of a derivative against extrapolated differences; NaN where there are none.
+
+    central (widths, n): error c h² + d h⁴ + rounding / h, so the best width differs; a wrong derivative is wrong at
+    all of them.
+    """
+    errors = np.abs((4.0 * central[1:] - central[:-1]) / 3.0 - claimed)
+    worst = np.where(np.isnan(errors), np.inf, errors).min(axis=0)
+    return np.where(np.isinf(worst), np.nan, worst)
+
+
+def orders(central: Array, claimed: Array, scale: Array) -> Array:
+    """Return log2 of the ratio of errors at neighbouring widths, where these are far above rounding."""
+    errors = np.abs(central - claimed) / scale
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.log2(errors[:-1] / errors[1:])
+    return found[(errors[1:] > 1e-9) & (errors[:-1] < 1e-3) & np.isfinite(found)]

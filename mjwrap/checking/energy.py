@@ -1,0 +1,104 @@
+"""Energy over a short motion without losses: what the muscles do is what the skeleton gains."""
+
+from __future__ import annotations
+
+import copy
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.checking.outcome import Check
+from mjwrap.errors import ModelError, StateError
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+SECONDS, ACTIVATION, LIMIT = 0.1, 0.1, 1e-6
+TIMESTEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # [s]
+_HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a copy that keeps its energy but for the muscles': no damping, limit, contact, fluid or other actuator.
+
+    Hinges and slides get the largest inertia of their kind as armature, so that light ones are as slow as heavy ones.
+    """
+    model = copy.copy(model)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
+    model.opt.density = model.opt.viscosity = 0.0
+    model.dof_damping[:] = 0.0
+    model.tendon_damping[:] = 0.0
+    model.body_gravcomp[:] = 0.0
+    kinds = model.jnt_type[model.dof_jntid]
+    for kind in (_HINGE, _SLIDE):
+        dofs = np.flatnonzero(kinds == kind)
+        model.dof_armature[dofs] += np.max(model.dof_M0[dofs], initial=0.0)
+    return model
+
+
+def check_energy(model: mujoco.MjModel, qpos: Array) -> Check:
+    """Return how far energy and the muscles' work are apart after a motion from rest at a pose (nq,).
+
+    What is left is the integrator's, which loses its order where a path lifts off; so time steps are halved, some
+    times, until it is below the limit.
+    """
+    check = Check(
+        "energy", f"energy gained is the muscles' work, {SECONDS:g} s", LIMIT, "of what was exchanged"
+    )
+    for timestep in TIMESTEPS:
+        try:
+            drift, exchanged = _drift(model, qpos, timestep)
+        except (ModelError, StateError) as error:
+            check.skipped = str(error)
+            return check
+        check.worst, check.count = drift, 1
+        check.where = f"{exchanged:.3g} J exchanged, time step {1e3 * timestep:g} ms"
+        if drift <= LIMIT:
+            break
+    return check
+
+
+def _drift(model: mujoco.MjModel, qpos: Array, timestep: float) -> tuple[float, float]:
+    """Return the gap between energy and work, as a share of what was exchanged, and that [J].
+
+    `ModelError` where the model allows no such motion.
+    """
+    model = without_losses(model)
+    model.opt.timestep = timestep
+    muscles, data, scratch = MuscleSystem(model), mujoco.MjData(model), mujoco.MjData(model)
+    elastic = [m.name for m in muscles.declarations if m.parameters.states == 2]
+    if elastic:
+        raise ModelError(
+            f"{len(elastic)} muscles have elastic tendons, whose steps are implicit ('{elastic[0]}')"
+        )
+    taken = [m.actuator for m in muscles.declarations if m.actuator >= 0]
+    others = np.setdiff1d(np.arange(model.nactuator), taken)
+    model.actuator_gainprm[others] = model.actuator_biasprm[others] = 0.0
+    data.qpos[:], data.act[:], muscles.excitation = qpos, ACTIVATION, np.full(muscles.n, ACTIVATION)
+    data.ctrl[model.actuator_ctrladr[taken]] = ACTIVATION
+    energy, power, moved = [], [], 0.0
+    for k in range(round(SECONDS / timestep) + 1):
+        if k:
+            muscles.step(data)
+        muscles.forward(data)
+        for i in np.flatnonzero(muscles.status):
+            raise ModelError(f"'{muscles.names[i]}' has no path on the way: {muscles.reason(int(i))}")
+        each = -muscles.tension * muscles.velocity
+        energy.append(_energy(model, data, scratch))
+        power.append(float(each.sum()))
+        moved += timestep * float(np.abs(each).sum())
+    done = timestep / 3.0 * (power[0] + power[-1] + 4.0 * sum(power[1:-1:2]) + 2.0 * sum(power[2:-1:2]))
+    exchanged = max(moved, float(np.ptp(energy)))
+    if exchanged < 1e-9:
+        raise ModelError("nothing moves")
+    return abs(energy[-1] - energy[0] - done) / exchanged, exchanged
+
+
+def _energy(model: mujoco.MjModel, data: mujoco.MjData, scratch: mujoco.MjData) -> float:
+    scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
+    mujoco.mj_fwdPosition(model, scratch)
+    mujoco.mj_fwdVelocity(model, scratch)
+    mujoco.mj_energyPos(model, scratch)
+    mujoco.mj_energyVel(model, scratch)
+    return float(scratch.energy.sum())

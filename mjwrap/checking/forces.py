@@ -1,0 +1,77 @@
+"""Forces against the lengths that they belong to: virtual work, balance, power."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.checking.outcome import Check
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+
+
+def work_check() -> Check:
+    """Return the check that the generalised force of all muscles is −Σ F ∂l/∂q."""
+    return Check("virtual_work", "generalised force is -F dl/dq", 1e-9, "of its parts")
+
+
+def balance_check() -> Check:
+    """Return the check that the forces of every muscle add up to nothing."""
+    return Check("balance", "forces and moments of each muscle balance", 1e-12, "of F, of F l")
+
+
+def power_check() -> Check:
+    """Return the check that the power of every muscle's forces is −F l̇."""
+    return Check("power", "power of each muscle's forces is -F dl/dt", 1e-9, "of its parts")
+
+
+def look_at_forces(
+    muscles: MuscleSystem,
+    data: mujoco.MjData,
+    jacobian: Array,
+    where: str,
+    checks: tuple[Check, Check, Check],
+) -> None:
+    """Apply the muscles' forces at the state in `data`, whose ∂l/∂q is `jacobian` (n, nv), and compare."""
+    work, balance, power = checks
+    model = muscles.model
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    data.xfrc_applied[:] = 0.0
+    muscles.apply(data)
+    tension, velocity, names = muscles.tension, muscles.velocity, muscles.names
+    found = np.zeros(model.nv)
+    for body in np.flatnonzero(data.xfrc_applied.any(axis=1)):
+        force, moment = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:]
+        mujoco.mj_applyFT(model, data, force, moment, data.xipos[body], int(body), found)
+    good = muscles.status == 0
+    if good.all():
+        parts = np.abs(jacobian).T @ tension
+        scale = float(parts.max(initial=0.0))
+        if scale > 0.0:
+            gap = np.abs(found + jacobian.T @ tension)
+            dofs = [f"dof {i}" for i in range(model.nv)]
+            work.see(gap / np.maximum(parts, 1e-6 * scale), where, dofs)
+    for i in np.flatnonzero(good & (tension > 0.0)):
+        pulls = muscles.forces(int(i))
+        points = np.array([point for _, point, _ in pulls])
+        forces = np.array([force for _, _, force in pulls])
+        centre = points.mean(axis=0)
+        reach = max(float(np.abs(points - centre).max()), 1e-6)
+        moment = np.abs(np.cross(points - centre, forces).sum(axis=0)).max() / (tension[i] * reach)
+        balance.see(
+            max(float(np.abs(forces.sum(axis=0)).max()) / tension[i], float(moment)), where, [names[i]]
+        )
+        speeds = np.array([_speed(model, data, body, point) for body, point, _ in pulls])
+        each = np.einsum("kj,kj->k", forces, speeds)
+        size = max(float(np.abs(each).sum()), 1e-9 * tension[i])
+        power.see(abs(float(each.sum()) + tension[i] * velocity[i]) / size, where, [names[i]])
+    muscles.reset(data)
+
+
+def _speed(model: mujoco.MjModel, data: mujoco.MjData, body: int, point: Array) -> Array:
+    """Return the velocity (3,) of a point of a body [m/s]."""
+    spin, base = data.cvel[body, :3], data.cvel[body, 3:]
+    return base + np.cross(spin, point - data.subtree_com[model.body_rootid[body]])

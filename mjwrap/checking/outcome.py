@@ -1,0 +1,92 @@
+"""What a check says: pass or fail, by how much, and where it was worst."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Check:
+    """One law: the worst figure met so far, of how many, and where; it holds while `worst` is at most `limit`.
+
+    what: the law in words; unit of worst and limit; skipped: why it could not be judged, else empty; remarks: what a
+    person should know beside the figure.
+    """
+
+    name: str
+    what: str
+    limit: float
+    unit: str = ""
+    worst: float = 0.0
+    where: str = ""
+    count: int = 0
+    skipped: str = ""
+    remarks: list[str] = field(default_factory=list)
+
+    def see(self, values: Array | float, where: str, names: list[str] | None = None) -> None:
+        """Take figures into account, each named by `names`; those that are NaN were not measured."""
+        given = np.atleast_1d(np.asarray(values, dtype=np.float64)).ravel()
+        known = np.where(np.isnan(given), -math.inf, given)
+        self.count += int((~np.isnan(given)).sum())
+        if not known.size or not known.max() > self.worst:
+            return
+        k = int(np.argmax(known))
+        self.worst = float(known[k])
+        self.where = f"{names[k]}, {where}" if names else where
+
+    @property
+    def verdict(self) -> str:
+        """Return "pass", "FAIL" or "skip"."""
+        if self.skipped or not self.count:
+            return "skip"
+        return "pass" if self.worst <= self.limit else "FAIL"
+
+    @property
+    def reason(self) -> str:
+        """Return why it could not be judged."""
+        return self.skipped or ("" if self.count else "nothing to measure")
+
+
+@dataclass(frozen=True)
+class Checks:
+    """All checks of a model, in order; facts: how many muscles, poses and sweeps they are from."""
+
+    checks: list[Check]
+    facts: dict[str, int]
+
+    @property
+    def failed(self) -> list[Check]:
+        """Return the laws that do not hold."""
+        return [check for check in self.checks if check.verdict == "FAIL"]
+
+    def table(self) -> str:
+        """Return a line for each check, and its remarks below it."""
+        wide = max(len(check.what) for check in self.checks)
+        lines = []
+        for check in self.checks:
+            unit = f" {check.unit}" if check.unit else ""
+            if check.verdict == "skip":
+                told = f"not judged: {check.reason}"
+            elif check.limit == 0.0:
+                told = f"{check.worst:.0f}{unit}, of {check.count}"
+            else:
+                told = f"{check.worst:.1e}{unit}, limit {check.limit:.0e}"
+                told += f"  ({check.where})" if check.where else ""
+            lines.append(f"{check.verdict}  {check.what:{wide}s}  {told}")
+            lines += [f"      {remark}" for remark in check.remarks]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as plain values."""
+        found = [
+            {**asdict(check), "verdict": check.verdict.lower(), "skipped": check.reason}
+            for check in self.checks
+        ]
+        return {**self.facts, "passed": not self.failed, "checks": found}

@@ -1,0 +1,74 @@
+"""Check on your own model the laws that hold on every model, pass or fail, each with its worst figure and where.
+
+MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes. At random poses, from a cold
+start: are paths tangent to their surfaces, are the lengthening speed and the moment arms the derivatives of the length,
+is the generalised force -F dl/dq, do each muscle's forces balance, is their power -F dl/dt? Along sweeps of every
+joint: does a length or a moment arm jump, is there a path everywhere? In a short motion without losses: is the energy
+that the skeleton gains the muscles' work?
+
+Examples:
+  mjwrap check models/elbow/elbow.xml
+  mjwrap check myo_sim:myoarm_r --poses 5 --samples 51 --json check.json
+
+Exit code 1 where a law does not hold.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from mjwrap.checking import check_model
+from mjwrap.cli.arguments import at_least
+from mjwrap.cli.errors import FAULTS
+from mjwrap.cli.models import load, start_keyframe, start_state
+from mjwrap.cli.output import Report, add_json
+from mjwrap.cli.progress import progress_bar
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which arguments there are."""
+    add = parser.add_argument
+    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
+    add("--keyframe", metavar="NAME", help="pose to sweep around (default: the model's own)")
+    add("--poses", type=at_least(1), default=20, metavar="N", help="random poses (%(default)s)")
+    add("--samples", type=at_least(3), default=101, metavar="N", help="poses of a sweep (%(default)s)")
+    add("--seed", type=at_least(0), default=0, metavar="N", help="of the random poses (%(default)s)")
+    add_json(parser, "verdicts and figures")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Check, and say what holds."""
+    model = load(options.model)
+    base = start_state(model, start_keyframe(model, options.keyframe)).qpos
+    report = Report(options.json)
+    bars: list[Any] = []
+
+    def advance(name: str, done: int, count: int) -> None:
+        if not bars:
+            bars.append(progress_bar(count, "steps", "checking"))
+        bars[0].set_description_str(name)
+        bars[0].update(int(done > 0))
+
+    try:
+        found = check_model(
+            model,
+            poses=options.poses,
+            samples=options.samples,
+            base=base,
+            seed=options.seed,
+            progress=advance,
+        )
+    finally:
+        for bar in bars:
+            bar.close()
+    facts = found.facts
+    report.say(
+        f"{options.model}: {facts['muscles']} muscles at {facts['random_poses']} random poses and "
+        f"{facts['sweeps']} sweeps of {facts['poses_of_a_sweep']}"
+    )
+    report.say(found.table())
+    failed = len(found.failed)
+    report.say(f"{failed} of {len(found.checks)} checks failed" if failed else "no check failed")
+    report.finish({"model": options.model, **found.as_dict()})
+    return FAULTS if failed else 0

@@ -1,0 +1,68 @@
+"""Jumps of a length or its slope along a sweep: told from a steep stretch by halving the step until a jump is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Probe = Callable[[float], tuple[float, float]]  # place in the sweep -> length, slope
+
+LENGTH = 1e-6  # [m] smallest jump in length that is told
+SLOPE = 1e-5  # [m/rad] smallest jump in slope that is told
+NARROW = 1e-9  # of the sweep's range: the width at which a jump is told from a steep stretch
+LASTING = 0.5  # a jump keeps this share of its size while the width shrinks a thousandfold
+MOST = 3  # intervals looked into, for each muscle, sweep and kind
+
+
+def odd_intervals(
+    at: Array, length: Array, slope: Array, good: NDArray[np.bool_]
+) -> list[tuple[int, float | None]]:
+    """Return the intervals in which length (None) or slope (its usual bend) change as a smooth curve would not.
+
+    at, length, slope, good: (T,); good: whether there is a length. An interval k is from sample k to the next.
+    """
+    h, m, l = np.diff(at), slope, length
+    whole = good[1:] & good[:-1]
+    rest = np.where(whole, np.abs(np.diff(l) - 0.5 * h * (m[1:] + m[:-1])), 0.0)
+    turn = np.where(whole, np.abs(np.diff(m)), 0.0)
+    beside = np.maximum(np.append(turn[1:], 0.0), np.insert(turn[:-1], 0, 0.0))
+    bends = 0.5 * (np.append(np.diff(m)[1:], 0.0) + np.insert(np.diff(m)[:-1], 0, 0.0)) / h
+    odd_lengths = [int(k) for k in np.argsort(-rest)[:MOST] if rest[k] > 0.5 * LENGTH]
+    odd_slopes = [int(k) for k in np.argsort(-turn)[:MOST] if turn[k] > 2.0 * beside[k] + SLOPE]
+    found: list[tuple[int, float | None]] = [(k, None) for k in odd_lengths]
+    return found + [(k, float(bends[k])) for k in odd_slopes]
+
+
+def refine_jump(
+    probe: Probe, low: float, high: float, span: float, bend: float | None
+) -> tuple[float, float, float] | None:
+    """Halve an interval towards its jump; return (place, jump in length, jump in slope), or None if it is smooth.
+
+    bend: None: follow the half whose length disobeys its slopes more; a number: follow the larger change of slope, less
+    `bend` times the width, which is how the slope changes beside the interval.
+    """
+    (l0, m0), (l1, m1) = probe(low), probe(high)
+    wide: tuple[float, float] | None = None
+    while high - low > NARROW * span:
+        middle = 0.5 * (low + high)
+        lm, mm = probe(middle)
+        half = 0.5 * (middle - low)
+        left, right = abs(lm - l0 - half * (m0 + mm)), abs(l1 - lm - half * (mm + m1))
+        if bend is not None:
+            left, right = abs(mm - m0 - 2.0 * half * bend), abs(m1 - mm - 2.0 * half * bend)
+        if left >= right:
+            high, l1, m1 = middle, lm, mm
+        else:
+            low, l0, m0 = middle, lm, mm
+        smooth = abs(l1 - l0) < LENGTH if bend is None else abs(m1 - m0 - 2.0 * half * bend) < SLOPE
+        if smooth:
+            return None
+        if wide is None and high - low < 1e3 * NARROW * span:
+            wide = abs(l1 - l0), abs(m1 - m0)
+    assert wide is not None
+    length = l1 - l0 if abs(l1 - l0) >= max(LENGTH, LASTING * wide[0]) else 0.0
+    turn = m1 - m0 if abs(m1 - m0) >= max(SLOPE, LASTING * wide[1]) else 0.0
+    return (0.5 * (low + high), length, turn) if length or turn else None
