@@ -46,7 +46,9 @@ def check_model(
     arms = Check("moment_arm", "dl/dq is the derivative of l", 1e-8, "of its size")
     forces = work_check(), balance_check(), power_check()
     jumps = Check("jumps", "no jump of length or moment arm along a sweep", 0.0, "jumps")
-    makers = [maker, PoseMaker(model, maker.middle(), seed, 1)] if len(maker.joints()) > 1 else [maker]
+    makers, middle = [maker], maker.middle()
+    if len(maker.joints()) > 1 and not np.array_equal(middle, start):
+        makers.append(PoseMaker(model, middle, seed, 1))
     sweeps = [(each, joint, axis) for each in makers for joint in each.joints() for axis in each.axes(joint)]
     total = poses + len(sweeps) + 1
     tell = progress or (lambda name, done, all: None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from mjwrap.checking.outcome import Check
 from mjwrap.continuity import NARROW, Probe, odd_intervals, refine_jump
 from mjwrap.paths import Status
-from mjwrap.poses import Motion, PoseMaker
+from mjwrap.poses import PoseMaker
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -69,45 +70,49 @@ def sweep_joint(
         branches.append(muscles.branch(data))
         paths.look(muscles, f"{motion.name} = {motion.at[k]:.4f}")
     jumps.count += muscles.n
-    for i in range(muscles.n):
-        for at, size, turn in _jumps(
-            muscles, data, maker, (joint, axis), motion, branches, i, length, slope, status
-        ):
-            what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
-            jumps.remarks.append(f"{muscles.names[i]} at {motion.name} = {at:.6f}: {what}")
+    sweep = _Sweep(muscles, data, maker.maker(joint, axis), motion.at, branches)
+    for i, name in enumerate(muscles.names):
+        for found in _jumps(sweep, i, length[:, i], slope[:, i], status[:, i] == 0):
+            jumps.remarks.append(f"{name} at {motion.name} = {found}")
             jumps.worst += 1.0
 
 
-def _jumps(
-    muscles: MuscleSystem, data: mujoco.MjData, maker: PoseMaker, swept: tuple[int, int], motion: Motion,
-    branches: list[Array], i: int, length: Array, slope: Array, status: NDArray[np.int64],
-) -> list[tuple[float, float, float]]:  # fmt: skip
-    """Return where muscle i jumps along a sweep, and by how much [m, m/rad]."""
-    place = maker.maker(*swept)
-    found: list[tuple[float, float, float]] = []
-    for k, bend in odd_intervals(motion.at, length[:, i], slope[:, i], status[:, i] == 0):
-        probe = _probe(muscles, data, place, branches[k], i)
-        ends = float(motion.at[k]), float(motion.at[k + 1])
-        jump = refine_jump(probe, *ends, float(np.ptp(motion.at)), bend)
-        span = float(np.ptp(motion.at))
-        if jump is not None and all(abs(jump[0] - other[0]) > 1e3 * NARROW * span for other in found):
-            found.append(jump)
-    return found
+class _Sweep(NamedTuple):
+    """A sweep that has been evaluated: at (T,), and the branches at its samples."""
+
+    muscles: MuscleSystem
+    data: mujoco.MjData
+    place: Callable[[float], tuple[Array, Array]]
+    at: Array
+    branches: list[Array]
 
 
-def _probe(
-    muscles: MuscleSystem,
-    data: mujoco.MjData,
-    place: Callable[[float], tuple[Array, Array]],
-    branch: Array,
-    i: int,
-) -> Probe:
-    """Return a probe that comes to every place from the branch at the sample before."""
+def _jumps(sweep: _Sweep, i: int, length: Array, slope: Array, good: NDArray[np.bool_]) -> list[str]:
+    """Say where muscle i jumps, by how much, and how many surfaces it touches before and after."""
+    span = float(np.ptp(sweep.at))
+    found: dict[float, str] = {}
+    for k, bend in odd_intervals(sweep.at, length, slope, good):
+        probe = _probe(sweep, k, i)
+        jump = refine_jump(probe, float(sweep.at[k]), float(sweep.at[k + 1]), span, bend)
+        if jump is None or any(abs(jump[0] - other) < 1e3 * NARROW * span for other in found):
+            continue
+        at, size, turn = jump
+        touched = []
+        for side in (-2.0 * NARROW * span, 2.0 * NARROW * span):
+            probe(at + side)
+            touched.append(len(sweep.muscles.contact_points(i)))
+        what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
+        found[at] = f"{at:.6f}: {what}; {touched[0]} surfaces touched, then {touched[1]}"
+    return list(found.values())
+
+
+def _probe(sweep: _Sweep, k: int, i: int) -> Probe:
+    """Return a probe that comes to every place from the branch at sample k."""
 
     def probe(at: float) -> tuple[float, float]:
-        data.qpos[:], tangent = place(at)
-        muscles.set_branch(data, branch)
-        jacobian = muscles.length_jacobian(data)
-        return float(muscles.length[i]), float(jacobian[i] @ tangent)
+        sweep.data.qpos[:], tangent = sweep.place(at)
+        sweep.muscles.set_branch(sweep.data, sweep.branches[k])
+        jacobian = sweep.muscles.length_jacobian(sweep.data)
+        return float(sweep.muscles.length[i]), float(jacobian[i] @ tangent)
 
     return probe

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mjwrap.cli.errors import INTERRUPTED, RUN_FAILED, USER_ERROR, RunError, UserError
 from mjwrap.cli.output import Output
 from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
 
+_INPUTS = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
 _MYO_NOISE = (
     "Attaching a spec with an empty prefix"  # myo_sim's models do that; it matters for saving them only
 )
@@ -31,6 +33,14 @@ class Parser(argparse.ArgumentParser):
             allow_abbrev=False,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Read the arguments; a model or recording after --json is not the file that JSON goes to."""
+        given = list(args or [])
+        for i, (word, following) in enumerate(itertools.pairwise(given)):
+            if word == "--json" and (following.lower().endswith(_INPUTS) or following.startswith("myo_sim:")):
+                given[i] = "--json=-"
+        return super().parse_args(given, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Print the message and stop."""

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     states.add_argument("--out", metavar="FILE", help="paths and forces as a table; opens no viewer")
     states.add_argument("--columns", default="length,velocity,tension", metavar="KINDS", help="what it holds, as "
         "mjwrap run has it (default %(default)s)")  # fmt: skip
-    add_json(parser, "what --info says")
+    add_json(parser, "what the file holds")
 
 
 def port(text: str) -> int:
@@ -97,7 +97,7 @@ def replay_states(options: argparse.Namespace) -> int:
 
     if not options.model:
         raise UserError(f"'{options.file}' is a table of states: --model says of which model")
-    if options.record or options.out:
+    if options.record or options.out or options.info or options.json:
         recompute(options, options.record)
         return 0
     with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:

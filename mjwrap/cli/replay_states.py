@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 
 import numpy as np
 
 from mjwrap import MuscleSystem, Recorder, read_table
 from mjwrap.cli.models import load, start_keyframe, start_state
-from mjwrap.cli.output import Output
+from mjwrap.cli.output import Output, Report
 from mjwrap.cli.progress import Interrupt, progress_bar
 from mjwrap.cli.samples import Samples, choose_kinds
 from mjwrap.cli.states import read_states
@@ -23,6 +22,7 @@ def recompute(options: argparse.Namespace, recording: str | None) -> None:
     data = start_state(model, start_keyframe(model, options.keyframe))
     muscles = MuscleSystem(model)
     states = read_states(model, muscles, data, read_table(options.file))
+    report = Report(options.json)
     failures = np.zeros(muscles.n, dtype=np.int64)
     with contextlib.ExitStack() as stack:
         samples = None
@@ -46,15 +46,21 @@ def recompute(options: argparse.Namespace, recording: str | None) -> None:
         if samples is not None:
             samples.close()
     span = f"{states.time[0]:g} s to {states.time[-1]:g} s"
-    print(f"{options.file}: {len(states.time)} states of {options.model}, {span}", file=sys.stderr)
-    for remark in states.remarks:
-        print(f"  {remark}", file=sys.stderr)
-    for name, count in zip(muscles.names, failures.tolist(), strict=True):
-        if count:
-            reason = muscles.reason(muscles.index(name))
-            print(f"  {name}: no path at {count} states; at last {reason}", file=sys.stderr)
-    for what, path in (("recording", options.record), ("table", options.out)):
-        if path:
-            print(f"{what + ':':10s} {path}")
+    without = {
+        name: f"no path at {count} states; at last {muscles.reason(i)}"
+        for i, (name, count) in enumerate(zip(muscles.names, failures.tolist(), strict=True))
+        if count
+    }
+    report.say(f"{options.file}: {len(states.time)} states of {options.model}, {span}")
+    for line in (*states.remarks, *(f"{name}: {why}" for name, why in without.items())):
+        report.say(f"  {line}")
+    files = {what: path for what, path in (("recording", options.record), ("table", options.out)) if path}
+    for what, path in files.items():
+        report.say(f"{what + ':':10s} {path}")
+    report.finish({
+        "file": options.file, "model": options.model, "muscles": muscles.names, "states": len(states.time),
+        "start": states.time[0], "end": states.time[-1], "remarks": states.remarks, "paths_not_found": without,
+        "files": files,
+    })  # fmt: skip
     if interrupt.asked:
         raise KeyboardInterrupt

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mjwrap import MuscleSystem, Table
 from mjwrap.cli.errors import UserError
 from mjwrap.cli.models import single_joints
-from mjwrap.cli.samples import act_names, dof_names, qpos_names
+from mjwrap.cli.samples import KINDS, act_names, dof_names, qpos_names
 from mjwrap.excitation import control_names
 
 Array = NDArray[np.float64]
@@ -121,6 +121,7 @@ class _Reader:
             remarks.append(
                 f"{model.na - len(self.found['act'])} of {model.na} activations are not given: as at the start"
             )
+        self.unused = [name for name in self.unused if name.partition(":")[0] not in KINDS]
         if self.unused:
             remarks.append(f"{len(self.unused)} columns say nothing about the state: {_few(self.unused)}")
         return States(time, **arrays, remarks=tuple(remarks))
