@@ -1,6 +1,7 @@
 """mjwrap replay: says what a recording holds, serves it, and refuses a damaged one in one line."""
 
 import contextlib
+import json
 import signal
 import socket
 import subprocess
@@ -10,11 +11,15 @@ import urllib.request
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 
+from cli_runs import CASE2, ELBOW, Ran, run_here
 from made_up_runs import XML, simulate
+
+import mjwrap as mw
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +102,97 @@ def test_replay_serves_to_a_browser(model: mujoco.MjModel, tmp_path: Path) -> No
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         probe.bind(("127.0.0.1", port))  # nobody is left there
+
+
+# -------------------------------------------------------------------------- from a table of states
+
+
+def here(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
+    return run_here("replay", capsys, *arguments)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".sto", ".npz"])
+def test_the_states_of_a_run_give_its_paths_again(
+    suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, again = tmp_path / f"run{suffix}", tmp_path / "again.npz"
+    options = ["--excitation", "pulses", "--duration", 0.2, "--keyframe", "flexed"]
+    assert run_here("run", capsys, ELBOW, *options, "--out", run).code == 0
+    kinds = ["--columns", "qpos,qvel,activation,length,velocity,tension"]
+    ran = here(capsys, run, "--model", ELBOW, "--out", again, "--record", tmp_path / "r.rrd", *kinds)
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.splitlines()[0] == f"{run}: 51 states of {ELBOW}, 0 s to 0.2 s"
+    first, second = mw.read_table(run), mw.read_table(again)
+    assert np.array_equal(first.time, second.time)
+    for name in second.names:
+        assert first[name] == pytest.approx(second[name], rel=1e-12, abs=1e-15), name
+    assert "0 s to 0.2 s, 51 states" in here(capsys, tmp_path / "r.rrd", "--info").out
+
+
+def test_states_by_opensims_names_in_degrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of each column it is known what it is; velocities that are not there are differences."""
+    path, out = tmp_path / "ik.mot", tmp_path / "t.csv"
+    time = np.linspace(0.0, 1.0, 201)
+    angle = 60.0 + 30.0 * np.sin(2 * np.pi * time)
+    names = ("/jointset/elbow/elbow_flexion/value", "/forceset/BRA/activation", "/ground_force/px")
+    values = np.column_stack([angle, 0.25 + 0.0 * time, time])
+    mw.write_table(path, mw.Table(time, names, values, {"inDegrees": "yes"}))
+    ran = here(capsys, path, "--model", ELBOW, "--out", out, "--columns", "qpos,qvel,activation", "--json")
+    facts = json.loads(ran.out)
+    assert facts["remarks"] == [
+        "velocities are differences of the positions",
+        "6 of 7 activations are not given: as at the start",
+        "1 columns say nothing about the state: /ground_force/px",
+    ]
+    table = mw.read_table(out)
+    assert table["qpos:elbow_flexion"] == pytest.approx(np.radians(angle), rel=1e-15)
+    assert table["activation:BRA"] == pytest.approx(np.full(201, 0.25))
+    assert not table["activation:TRIlat"].any()
+    exact = np.radians(30.0) * 2 * np.pi * np.cos(2 * np.pi * time)
+    assert (
+        np.abs(table["qvel:elbow_flexion"] - exact)[1:-1].max()
+        < np.radians(30.0) * (2 * np.pi) ** 3 / 6 * 0.005**2
+    )
+
+
+def test_arrays_of_states_need_no_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = mujoco.MjModel.from_xml_path(ELBOW)
+    qpos, qvel = np.linspace(0.2, 1.0, 5)[:, None], np.ones((5, 1))
+    act = np.random.default_rng(0).uniform(size=(5, model.na))
+    np.savez(tmp_path / "s.npz", time=np.arange(5) / 5, qpos=qpos, qvel=qvel, act=act)
+    ran = here(
+        capsys, tmp_path / "s.npz", "--model", ELBOW, "--out", tmp_path / "t.csv", "--columns", "tension"
+    )
+    assert (ran.code, ran.err) == (0, "")
+    table = mw.read_table(tmp_path / "t.csv")
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    for k in range(5):
+        data.qpos[:], data.qvel[:], data.act[:] = qpos[k], qvel[k], act[k]
+        muscles.forward(data)
+        assert table.values[k] == pytest.approx(muscles.tension, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["{states}"], "is a table of states: --model says of which model"),
+        (["{states}", "--model", "nowhere.xml"], "nowhere.xml does not exist"),
+        (["{states}", "--model", CASE2], "no column names a joint; the model has: cylinder_y"),
+        (["{states}", "--model", ELBOW, "--out", "{folder}/t.pdf"], "must end in .sto"),
+        (["{states}", "--model", ELBOW, "--record", "{folder}/r.txt"], "must end in .rrd"),
+        (["{states}", "--model", ELBOW, "--keyframe", "bent", "--info"], "'bent'; keyframes"),
+        (["{folder}/no.csv", "--model", ELBOW], "no such file"),
+        (["{folder}/no.rrd", "--model", ELBOW], "--model goes with a table of states"),
+        (["{folder}/no.rrd"], "there is no recording"),
+    ],
+)
+def test_a_mistake_with_states_is_told_in_one_line(
+    arguments: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    states = tmp_path / "s.csv"
+    states.write_text("time,elbow_flexion\n0,1\n1,1.2\n")
+    ran = here(capsys, *(a.format(states=states, folder=tmp_path) for a in arguments))
+    assert ran.code == 2
+    assert told in ran.err
+    assert len(ran.err.splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["s.csv"]

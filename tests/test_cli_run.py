@@ -1,6 +1,7 @@
 """mjwrap run: what it computes is what the package computes, and what it says when it cannot."""
 
 import csv
+import json
 import math
 import re
 import resource
@@ -17,6 +18,7 @@ from cli_runs import CASE2, ELBOW, ROOT, Ran, environment, finish, run_here, sai
 from naive_tendon import cylinder_length
 
 import mjwrap as mw
+from mjwrap.cli.samples import spanned
 
 CART = """
 <mujoco>
@@ -45,6 +47,17 @@ ENTERS = """
   <actuator><muscle name="stuck" tendon="t" lengthrange=".05 .3"/></actuator>
 </mujoco>
 """
+OWN = """<custom>
+    <numeric name="mjwrap_free_max_isometric_force" data="100"/>
+    <numeric name="mjwrap_free_optimal_fiber_length" data=".1"/>
+    <numeric name="mjwrap_free_tendon_slack_length" data=".1"/>
+    <tuple name="mjwrap_free">
+      <element objtype="tendon" objname="t"/>
+      <element objtype="numeric" objname="mjwrap_free_max_isometric_force"/>
+      <element objtype="numeric" objname="mjwrap_free_optimal_fiber_length"/>
+      <element objtype="numeric" objname="mjwrap_free_tendon_slack_length"/>
+    </tuple>
+  </custom>"""
 
 
 def rows_of(path: Path) -> list[dict[str, float]]:
@@ -233,6 +246,10 @@ def test_a_model_without_muscles_runs(tmp_path: Path, capsys: pytest.CaptureFixt
         ([ELBOW, "--csv", "{folder}/sub.csv"], "not a file"),
         ([ELBOW, "--record", "{folder}/missing/r.rrd"], "no folder"),
         ([ELBOW, "--record", "{folder}/r.bin"], r"must end in \.rrd"),
+        ([ELBOW, "--out", "{folder}/t.xlsx"], r"must end in \.sto or \.mot or \.csv or \.npz"),
+        ([ELBOW, "--columns", "length,weight"], "no kind 'weight'; kinds: qpos, qvel"),
+        ([ELBOW, "--mode", "sideways"], "mode 'sideways' does not exist; modes: wrench"),
+        ([ELBOW, "--excitation", "{text}.sto"], r"text\.xml\.sto'.*no such file"),
         ([ELBOW, "--csv", "{folder}/c.csv", "--plot", "{folder}/missing/p.png"], "missing"),
     ],
 )
@@ -330,6 +347,122 @@ def test_ctrl_c_keeps_what_was_simulated(tmp_path: Path) -> None:
         capture_output=True, text=True, cwd=ROOT, env=environment(), check=True,
     )  # fmt: skip
     assert "BRA" in info.stdout
+
+
+# -------------------------------------------------------------------------- tables, modes, JSON
+
+
+@pytest.mark.parametrize("suffix", [".sto", ".csv", ".npz"])
+def test_a_table_holds_what_is_asked_for(
+    suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every moment arm that is not zero is there, as −∂l/∂q, at the state of its row."""
+    path = tmp_path / f"t{suffix}"
+    kinds = "qpos,qvel,act,length,moment_arm"
+    ran = simulate(
+        capsys, ELBOW, "--duration", 0.05, "--excitation", "constant:0.4", "--out", path, "--columns", kinds
+    )
+    assert ran.code == 0, ran.err
+    only_files(tmp_path, path.name)
+    table = mw.read_table(path)
+    model = mujoco.MjModel.from_xml_path(ELBOW)
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    for k in range(len(table.time)):
+        data.qpos[0], data.qvel[0] = table["qpos:elbow_flexion"][k], table["qvel:elbow_flexion"][k]
+        jacobian = muscles.length_jacobian(data)
+        for i, name in enumerate(muscles.names):
+            assert table[f"length:{name}"][k] == muscles.length[i]
+            assert table[f"moment_arm:{name}:elbow_flexion"][k] == -jacobian[i, 0]
+    assert {name.partition(":")[0] for name in table.names} == set(kinds.split(","))
+    assert table["act:BRA"][-1] > 0.1
+
+
+def test_moment_arms_that_are_left_out_are_zero() -> None:
+    for path in (CASE2, str(ROOT / "models" / "five_surfaces" / "five_surfaces.xml")):
+        model = mujoco.MjModel.from_xml_path(path)
+        muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+        jacobian = muscles.length_jacobian(data)
+        kept = [spanned(model, muscle) for muscle in muscles.declarations]
+        assert all(not np.delete(row, dofs).any() for row, dofs in zip(jacobian, kept, strict=True))
+        assert any(kept)
+
+
+def test_the_plugin_moves_the_model_to_the_same_places(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tables = []
+    for mode in ("python", "wrench"):
+        path = tmp_path / f"{mode}.npz"
+        options = ["--excitation", "random:2", "--integrator", "rk4", "--duration", 0.2, "--out", path]
+        ran = simulate(capsys, ELBOW, "--mode", mode, *options)
+        assert ran.code == 0, ran.err
+        tables.append(mw.read_table(path))
+    assert tables[0].names == tables[1].names
+    assert np.array_equal(tables[0].time, tables[1].time)
+    assert np.abs(tables[0].values - tables[1].values).max() < 1e-9
+    assert np.array_equal(tables[0]["qpos:elbow_flexion"], tables[1]["qpos:elbow_flexion"])
+
+
+def test_the_plugin_drives_muscles_without_an_actuator(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their excitation and activation are the plugin's own: the table has them all the same."""
+    model = tmp_path / "m.xml"
+    text = ENTERS.replace('<actuator><muscle name="stuck" tendon="t" lengthrange=".05 .3"/></actuator>', OWN)
+    assert OWN in text
+    model.write_text(text)
+    tables = []
+    for mode in ("python", "wrench"):
+        path = tmp_path / f"{mode}.npz"
+        ran = simulate(
+            capsys, model, "--mode", mode, "--excitation", "constant:0.5", "--duration", 0.05, "--out", path
+        )
+        assert (ran.code, "not found" in ran.out) == (0, False)
+        tables.append(mw.read_table(path))
+    assert tables[0]["activation:t"][-1] > 0.1
+    assert np.abs(tables[0].values - tables[1].values).max() < 1e-9
+
+
+def test_excitations_come_from_opensims_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same numbers as CSV and as .sto, there under OpenSim's names; and the table of a run drives another one."""
+    times, level = np.array([0.0, 0.1]), np.array([[0.1, 0.2], [0.9, 0.4]])
+    mw.write_table(tmp_path / "u.csv", mw.Table(times, ("BRA", "TRIlat"), level))
+    mw.write_table(tmp_path / "u.sto", mw.Table(times, ("/forceset/BRA", "TRIlat.excitation"), level))
+    ends = []
+    for given in ("u.csv", "u.sto", "c.csv"):
+        options = ["--duration", 0.1, "--sample", 0.002, "--csv", tmp_path / "c.csv"]
+        ran = simulate(capsys, ELBOW, "--excitation", tmp_path / given, *options)
+        assert ran.code == 0, ran.err
+        ends.append(rows_of(tmp_path / "c.csv")[-1])
+    assert ends[0] == ends[1]
+    assert ends[0] == pytest.approx(ends[2], rel=1e-12)
+    mw.write_table(tmp_path / "u.sto", mw.Table(times, ("/forceset/BRA", "BRA"), level))
+    ran = simulate(capsys, ELBOW, "--excitation", tmp_path / "u.sto")
+    assert ran.code == 2
+    assert "are both muscle or actuator 'BRA'" in ran.err
+
+
+def test_prescribed_degrees_are_turned_into_radians(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, table = tmp_path / "ik.mot", tmp_path / "c.csv"
+    degrees = mw.Table(
+        np.array([0.0, 1.0]), ("elbow_flexion",), np.array([[90.0], [90.0]]), {"inDegrees": "yes"}
+    )
+    mw.write_table(path, degrees)
+    assert simulate(capsys, ELBOW, "--prescribe", path, "--duration", 0.01, "--csv", table).code == 0
+    assert rows_of(table)[-1]["qpos:elbow_flexion"] == pytest.approx(0.5 * math.pi, abs=1e-12)
+
+
+def test_json_takes_the_place_of_the_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ran = simulate(capsys, ELBOW, "--duration", 0.02, "--csv", tmp_path / "c.csv", "--json")
+    facts = json.loads(ran.out)
+    assert facts["simulated"] == pytest.approx(0.02)
+    assert (len(facts["muscles"]), facts["mode"], facts["paths_not_found"]) == (7, "python", {})
+    assert facts["files"] == {"csv": str(tmp_path / "c.csv")}
+    both = simulate(capsys, ELBOW, "--duration", 0.02, "--json", tmp_path / "j.json")
+    assert "7 muscles" in both.out
+    assert json.loads((tmp_path / "j.json").read_text()).keys() == facts.keys()
 
 
 def test_nothing_heavy_loads_unless_it_is_asked_for(tmp_path: Path) -> None:

@@ -63,10 +63,10 @@ def execute(options: argparse.Namespace) -> int:
         for bar in bars:
             bar.close()
     facts = found.facts
-    report.say(
-        f"{options.model}: {facts['muscles']} muscles at {facts['random_poses']} random poses and "
-        f"{facts['sweeps']} sweeps of {facts['poses_of_a_sweep']}"
-    )
+    muscles = f"{facts['muscles']} muscle{'s' * (facts['muscles'] != 1)}"
+    sweeps = f"{facts['sweeps']} sweep{'s' * (facts['sweeps'] != 1)}"
+    poses = f"{facts['random_poses']} random poses and {sweeps} of {facts['poses_of_a_sweep']} poses"
+    report.say(f"{options.model}: {muscles} at {poses}")
     report.say(found.table())
     failed = len(found.failed)
     report.say(f"{failed} of {len(found.checks)} checks failed" if failed else "no check failed")

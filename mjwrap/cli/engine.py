@@ -110,9 +110,9 @@ class PluginEngine:
         """Return, by muscle, on how many steps it had no path, and why, where that is so now."""
         held = self._read(self.data)
         found = {}
-        for name, count, code in zip(held.names, held.failures, held.status, strict=True):
+        for name, count, code in zip(held.names, held.failures.tolist(), held.status.tolist(), strict=True):
             if count:
-                why = f"; now {Status(int(code)).message}" if code else ""
+                why = f"; now {Status(code).message}" if code else ""
                 found[name] = f"{count} step{'s' * (count != 1)} without a path{why}"
         return found
 

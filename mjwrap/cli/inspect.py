@@ -54,8 +54,9 @@ def execute(options: argparse.Namespace) -> int:
     muscles = MuscleSystem(model)
     if not muscles.names and not muscles.native:
         raise UserError("the model has no muscles: nothing to inspect")
+    s = "s" * (muscles.n != 1)
     report.say(
-        f"{options.model}: {muscles.n} muscles along geodesic paths, {len(muscles.native)} with MuJoCo's own"
+        f"{options.model}: {muscles.n} muscle{s} along geodesic paths, {len(muscles.native)} with MuJoCo's own"
     )
     report.say(table(model, muscles.declarations))
     for name, reason in muscles.native.items():

@@ -12,8 +12,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-
 from mjwrap.cli.errors import RunError, UserError
 
 
@@ -127,7 +125,7 @@ class Report:
 
 def plain(value: Any) -> Any:
     """Return a value as JSON knows it: arrays as lists, what is not finite as null."""
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # NumPy's arrays and numbers
         value = value.tolist()
     if isinstance(value, float):
         return value if math.isfinite(value) else None

@@ -1,0 +1,141 @@
+"""The command `mjwrap`: help, exit codes, what is loaded, and the commands that have no test file of their own."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+from cli_runs import CASE2, ELBOW, ROOT, Ran, environment, finish, run_here, said, start
+from test_cli_run import ENTERS
+
+from mjwrap.cli import main
+from mjwrap.cli.main import COMMANDS
+from mjwrap.kernels import _jit
+
+
+def test_help_names_every_command_and_its_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    overview = capsys.readouterr().out
+    for name in COMMANDS:
+        assert f"\n  {name} " in overview
+        ran = run_here(name, capsys, "--help")
+        assert (ran.code, ran.err) == (0, "")
+        assert f"Examples:\n  mjwrap {name}" in ran.out
+        assert max(map(len, ran.out.splitlines())) <= 120
+
+
+def test_a_wrong_command_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate"]) == 2
+    assert capsys.readouterr().err.startswith(
+        "mjwrap: no command 'simulate'; commands: run, compare, inspect"
+    )
+    assert main(["--frob"]) == 2
+    assert "no option '--frob'" in capsys.readouterr().err
+    assert main([]) == 2
+    assert "usage: mjwrap COMMAND" in capsys.readouterr().out
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == "mjwrap 0.1.0\n"
+    assert run_here("check", capsys).code == 2
+
+
+@pytest.mark.parametrize(
+    ("script", "command"),
+    [
+        ("simulate", "run"),
+        ("compare_tendon", "compare"),
+        ("replay", "replay"),
+        ("inspect_muscles", "inspect"),
+    ],
+)
+def test_the_scripts_are_the_commands(script: str, command: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / f"{script}.py"), "nowhere.xml", "--frob"],
+        capture_output=True, text=True, check=False, env=environment(),
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"mjwrap {command}: unrecognized arguments: --frob")
+
+
+def test_help_loads_neither_mujoco_nor_what_draws() -> None:
+    code = (
+        "import sys; from mjwrap.cli import main; main(['--help']); "
+        "print(sorted({'mujoco', 'numba', 'numpy', 'rerun', 'matplotlib', 'tqdm'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def inspect(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
+    return run_here("inspect", capsys, *arguments)
+
+
+def test_inspect_says_what_is_declared(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    ran = inspect(capsys, ELBOW, "--quick")
+    assert (ran.code, said(ran)) == (0, [])
+    (line,) = (line for line in ran.out.splitlines() if line.startswith("BRA "))
+    assert line.split()[:6] == ["BRA", "degroote_fregly_2016", "987.3", "85.8", "53.5", "rigid"]
+    assert "BRA_origin > flexor_cylinder (cylinder, side flexor_side) > BRA_insertion" in line
+    values = json.loads(inspect(capsys, ELBOW, "--quick", "--json").out)
+    assert [muscle["name"] for muscle in values["muscles"]] == list(mujoco_names(ELBOW))
+    (muscle,) = (m for m in values["muscles"] if m["name"] == "BRA")
+    assert muscle["parameters"]["max_isometric_force"] == 987.26
+    (route,) = muscle["routes"]
+    assert route["stops"][0]["surface"] == "Cylinder"
+    assert (
+        inspect(capsys, "--quick", "--json", ELBOW).out
+        == inspect(capsys, ELBOW, "--quick", "--json", "-").out
+    )
+    wrong = inspect(capsys, ELBOW, "--json", tmp_path / "j.txt")
+    assert (wrong.code, "must end in .json" in wrong.err) == (2, True)
+
+
+def mujoco_names(path: str) -> list[str]:
+    model = mujoco.MjModel.from_xml_path(path)
+    return [model.actuator(i).name for i in range(model.nu)]
+
+
+def test_inspect_says_what_stays_native_and_why(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "m.xml"
+    muscle = '<muscle name="joint" joint="cylinder_y" lengthrange="0 1"/>'
+    path.write_text(Path(CASE2).read_text().replace("</actuator>", f"{muscle}</actuator>"))
+    ran = inspect(capsys, path, "--quick")
+    assert "1 muscle along geodesic paths, 1 with MuJoCo's own" in ran.out
+    assert "joint: stays with MuJoCo: " in ran.out
+    assert list(json.loads(inspect(capsys, path, "--quick", "--json").out)["native"]) == ["joint"]
+
+
+def test_check_passes_or_fails_by_its_exit_code(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    few = ["--poses", 2, "--samples", 11]
+    ran = run_here("check", capsys, ELBOW, *few)
+    assert (ran.code, said(ran)) == (0, [])
+    assert ran.out.splitlines()[-1] == "no check failed"
+    path = tmp_path / "m.xml"
+    path.write_text(ENTERS)
+    ran = run_here("check", capsys, path, *few, "--json", tmp_path / "c.json")
+    assert ran.code == 1
+    assert "FAIL  the model allows a path at every pose" in ran.out
+    assert "is inside geom 'ball'" in ran.out
+    values = json.loads((tmp_path / "c.json").read_text())
+    assert [c["name"] for c in values["checks"] if c["verdict"] == "fail"] == ["model"]
+    assert values["passed"] is False
+    empty = tmp_path / "empty.xml"
+    empty.write_text("<mujoco/>")
+    ran = run_here("check", capsys, empty)
+    assert (ran.code, said(ran)) == (
+        2,
+        ["mjwrap check: the model has no muscles along geodesic paths: nothing to check"],
+    )
+
+
+def test_warmup_leaves_nothing_to_compile(capsys: pytest.CaptureFixture[str]) -> None:
+    first = json.loads(run_here("warmup", capsys, "--json").out)
+    assert Path(first["folder"]) == Path(_jit._CACHE)
+    again = json.loads(finish(start("warmup", ELBOW, "--json")).out)
+    assert (again["compiled"], again["folder"]) == (0, first["folder"])
+    assert [part["part"] for part in again["parts"]] == ["paths", "muscles", "plugin", ELBOW]
+    done = finish(start("run", ELBOW, "--duration", "0.01", "--mode", "wrench"))
+    assert (done.code, done.err) == (0, "")
