@@ -157,9 +157,9 @@ def run_demo() -> int:
     (ROOT / "out").mkdir(exist_ok=True)
     arguments = [DEMO_MODEL, "--duration", "2", "--excitation", "pulses"]
     outputs = ["--record", DEMO_RECORDING, "--plot", DEMO_PLOT]
-    say(f"running scripts/simulate.py {' '.join(arguments + outputs)}")
+    say(f"running mjwrap run {' '.join(arguments + outputs)}")
     result = subprocess.run(
-        [str(python), "scripts/simulate.py", *arguments, *outputs], cwd=ROOT, env=environment()
+        [str(python), "-m", "mjwrap", "run", *arguments, *outputs], cwd=ROOT, env=environment()
     )
     if result.returncode:
         return result.returncode
@@ -168,7 +168,7 @@ def run_demo() -> int:
         raise SetupError(f"the run ended well but did not leave {' and '.join(missing)}")
     say(f"the plot is {ROOT / DEMO_PLOT}")
     say(f"the recording is {ROOT / DEMO_RECORDING}")
-    say(f"look at it with: {python.relative_to(ROOT)} scripts/replay.py {DEMO_RECORDING}")
+    say(f"look at it with: {python.relative_to(ROOT)} -m mjwrap replay {DEMO_RECORDING}")
     return 0
 
 

@@ -28,15 +28,12 @@ def test_a_sound_model_passes_every_check(path: str) -> None:
 
 def failed_when(monkeypatch: pytest.MonkeyPatch, name: str, spoil: Callable[[Any], Any]) -> set[str]:
     """Return the checks that fail where a result of MuscleSystem is spoilt."""
-    sound = getattr(mw.MuscleSystem, name)
+    sound: Any = getattr(mw.MuscleSystem, name)
     if isinstance(sound, property):
-        spoilt: Any = property(lambda self: spoil(sound.fget(self)))  # pyright: ignore[reportOptionalCall]
+        get: Any = sound.fget
+        monkeypatch.setattr(mw.MuscleSystem, name, property(lambda muscles: spoil(get(muscles))))
     else:
-
-        def spoilt(self: mw.MuscleSystem, *arguments: Any) -> Any:
-            return spoil(sound(self, *arguments))
-
-    monkeypatch.setattr(mw.MuscleSystem, name, spoilt)
+        monkeypatch.setattr(mw.MuscleSystem, name, lambda *arguments: spoil(sound(*arguments)))
     return {c.name for c in check(CASE2).failed}
 
 

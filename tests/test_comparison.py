@@ -17,9 +17,9 @@ from mjwrap.comparison import (
     verdict,
     with_native_laws,
 )
-from mjwrap.comparison.jumps import _refine
 from mjwrap.comparison.tendons import WrapRecord, tendon_spans
 from mjwrap.comparison.twins import Comparer
+from mjwrap.continuity import refine_jump
 from mjwrap.poses import PoseMaker
 
 BALL = """
@@ -259,7 +259,7 @@ def test_jumps_are_found_where_they_are_and_as_large() -> None:
         low = place - rng.uniform(0.0, 0.01)  # an interval of a sweep in a hundred steps
         bend = -float(np.sin(low))
         for size, way in (((length, 0.0), None), ((0.0, slope), bend), ((length, slope), None)):
-            found = _refine(jump_at(place, *size), low, low + 0.01, 1.0, way)
+            found = refine_jump(jump_at(place, *size), low, low + 0.01, 1.0, way)
             assert found is not None
             assert found[0] == pytest.approx(place, abs=2e-9)
             assert found[1:] == pytest.approx(size, rel=1e-3, abs=1e-8)
@@ -273,7 +273,7 @@ def test_a_steep_stretch_is_no_jump(width: float) -> None:
         return rise, 0.01 / (1.0 + np.exp(-x))
 
     for bend in (0.0, None):
-        assert _refine(probe, 0.37, 0.38, 1.0, bend) is None
+        assert refine_jump(probe, 0.37, 0.38, 1.0, bend) is None
 
 
 def test_a_slope_that_grows_without_bound_is_no_jump() -> None:
@@ -282,7 +282,7 @@ def test_a_slope_that_grows_without_bound_is_no_jump() -> None:
         return 0.1 * x**1.5, 0.15 * x**0.5
 
     for bend in (0.0, None):
-        assert _refine(probe, 0.37, 0.38, 1.0, bend) is None
+        assert refine_jump(probe, 0.37, 0.38, 1.0, bend) is None
 
 
 def test_with_one_law_both_move_alike() -> None:
