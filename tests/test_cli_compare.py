@@ -5,6 +5,7 @@ import json
 import re
 import signal
 import time
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,58 @@ def test_a_comparison_in_text_json_csv_and_a_picture(
     assert all(abs(float(row["length_mujoco"]) - float(row["length_mjwrap"])) < 1e-9 for row in rows)
     assert "both, equal at every pose" in ran.out
     assert "7 muscles with another law pull by MuJoCo's curves" in ran.out
+
+
+def test_a_report_is_one_page_that_loads_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "ball & <socket>.xml"
+    model.write_text(BALL.format(side='sidesite="side"'))
+    report, facts = tmp_path / "r.html", tmp_path / "j.json"
+    ran = compare(capsys, model, "--samples", 101, "--duration", 0.02, "--report", report, "--json", facts)
+    assert ran.code == 0, ran.err
+    page, figures = report.read_text(encoding="utf-8"), json.loads(facts.read_text())
+    assert figures["jumps"]
+    reader = PageReader()
+    reader.feed(page)
+    assert not reader.open  # every element is closed
+    assert not [link for link in reader.links if not link.startswith("#")]
+    assert {f"m-{name}" for name in figures["muscles"]} <= reader.ids
+    assert reader.tags.count("svg") >= 2  # a sweep and the motion
+    for jump in figures["jumps"]:
+        assert f"{jump['sweep']} = {jump['at']:.6f}" in reader.text
+    assert "ball & <socket>.xml" in reader.text
+
+
+class PageReader(HTMLParser):
+    """What an HTML page holds: its text, tags, ids and links, and elements left open."""
+
+    EMPTY = ("meta", "br", "img", "link")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.links: list[str] = []
+        self.ids: set[str] = set()
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+        self.tags.append(tag)
+        found = dict(attrs)
+        self.ids.add(found.get("id") or "")
+        self.links += [found[key] or "" for key in ("href", "src", "xlink:href") if key in found]
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in self.EMPTY:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
 
 
 def test_muscles_are_chosen_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

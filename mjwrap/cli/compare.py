@@ -8,6 +8,7 @@ controls.
 
 Examples:
   mjwrap compare models/elbow/elbow.xml --plot compare.png
+  mjwrap compare myo_sim:myoarm_r --bases 8 --samples 41 --report arm.html
   mjwrap compare myo_sim:myoarm_r --samples 51 --bases 4 --muscles 'LAT*' DELT1 --json compare.json
 """
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import fnmatch
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--law", choices=("mujoco", "declared"), default="mujoco", help="in mjwrap's run: MuJoCo's own curves, so that "
         "both differ by the path alone, or the declared law")  # fmt: skip
     add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
+    add("--report", metavar="FILE.html", help="a page with a table of all muscles, plots and verdicts")
     add("--csv", metavar="FILE.csv", help="a row for every muscle and pose")
     add_json(parser, "all figures")
     add("--check", action="store_true", help="exit code 1 where mjwrap is not right")
@@ -85,9 +88,10 @@ def execute(options: argparse.Namespace) -> int:
     names = choose(muscles, options.muscles)
     Excitation(muscles, options.excitation, options.seed)  # so that a mistake in it shows before the work
     plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
+    page = Output(options.report, "--report", (".html", ".htm")) if options.report else None
     table = Output(options.csv, "--csv", (".csv",)) if options.csv else None
     report = Report(options.json)
-    if plot is not None:
+    if plot is not None or page is not None:
         need_matplotlib()
     rows = PoseTable(table) if table is not None else None
     found = compare_all(model, names, options, start, rows)
@@ -111,7 +115,13 @@ def execute(options: argparse.Namespace) -> int:
 
         title = f"{Path(options.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
         plot_comparison(plot, title, found, motion)
-    for what, path in (("plot", options.plot), ("csv", options.csv)):
+    if page is not None:
+        from mjwrap.cli.compare_page import write_page
+
+        write_page(
+            page, options.model, shlex.join(["mjwrap", "compare", *options.given]), found, verdicts, motion
+        )
+    for what, path in (("plot", options.plot), ("report", options.report), ("csv", options.csv)):
         if path:
             report.say(f"{what + ':':10s} {path}")
     given = {name: getattr(options, name) for name in ("model", "samples", "bases", "seed")}

@@ -84,7 +84,7 @@ def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) ->
         say("\nwhere lengths differ most")
         for s in sorted(far, key=lambda s: -s.length.difference)[:10]:
             say(
-                f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {_where(s.length)}"
+                f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {where(s.length)}"
             )
     if found.jumps:
         _tell_jumps(say, found.jumps)
@@ -119,7 +119,8 @@ def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
         )
 
 
-def _where(extreme: Extreme) -> str:
+def where(extreme: Extreme) -> str:
+    """Say where a largest difference was seen."""
     if extreme.motion in extreme.joints:
         return f"{extreme.motion} = {extreme.at:.6f}"
     told = ", ".join(f"{name} = {value:.4f}" for name, value in list(extreme.joints.items())[:6])

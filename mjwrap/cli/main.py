@@ -63,4 +63,6 @@ def _execute(name: str, arguments: list[str]) -> int:
     command = importlib.import_module(f"mjwrap.cli.{name}")
     parser = console.Parser(f"mjwrap {name}", command.__doc__ or "")
     command.add_arguments(parser)
-    return command.execute(parser.parse_args(arguments))
+    options = parser.parse_args(arguments)
+    options.given = list(arguments)  # as typed, for what says how it was made
+    return command.execute(options)

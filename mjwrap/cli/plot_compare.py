@@ -41,13 +41,13 @@ def plot_comparison(
     figure.suptitle(title, fontsize=11)
     sides: Any = figure.subfigures(1, 2, width_ratios=(1.0, 2.6))
     left, right = sides
-    _bars(left.subplots(), both)
+    draw_outcomes(left.subplots(), both)
     if rows:
         axes = right.subplots(rows, 2, squeeze=False)
         for pair, summary in zip(axes, shown, strict=False):
-            _sweep(pair, summary, found)
+            draw_sweep(pair, summary, found)
         if motion is not None and motion.difference.size:
-            _motion(axes[-1], motion)
+            draw_motion(axes[-1], motion)
     save(figure, output)
 
 
@@ -70,7 +70,7 @@ def _telling(found: PoseComparison) -> list[MuscleSummary]:
     return sorted(drawn, key=weight, reverse=True)[:SWEEPS]
 
 
-def _bars(axis: Any, both: list[MuscleSummary]) -> None:
+def draw_outcomes(axis: Any, both: list[MuscleSummary]) -> None:
     """Draw the share of poses of each outcome, a bar a muscle."""
     start = np.zeros(len(both))
     for outcome in Outcome:
@@ -86,7 +86,7 @@ def _bars(axis: Any, both: list[MuscleSummary]) -> None:
         axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=7.5, frameon=False, ncols=2)
 
 
-def _sweep(pair: Any, summary: MuscleSummary, found: PoseComparison) -> None:
+def draw_sweep(pair: Any, summary: MuscleSummary, found: PoseComparison) -> None:
     """Draw length and moment arm of both along one sweep."""
     curves = summary.curves
     assert curves is not None
@@ -112,7 +112,7 @@ def _sweep(pair: Any, summary: MuscleSummary, found: PoseComparison) -> None:
     pair[0].legend(fontsize=7.5, frameon=False)
 
 
-def _motion(pair: Any, motion: MotionDifference) -> None:
+def draw_motion(pair: Any, motion: MotionDifference) -> None:
     """Draw the joint that differs most in both runs, and the difference of the six that differ most."""
     order = np.argsort(-np.abs(motion.difference).max(axis=0))[:6]
     for d in order:
