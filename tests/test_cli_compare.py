@@ -8,10 +8,12 @@ import time
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_runs import CASE2, ELBOW, Ran, finish, run_here, said, start
 from test_comparison import BALL
 
+import mjwrap as mw
 from mjwrap.comparison.twins import Comparer
 
 
@@ -195,3 +197,108 @@ def test_a_mistake_is_told_in_one_line_and_leaves_nothing(
     assert re.search(told, line), line
     assert ran.out == ""
     only_files(tmp_path, "text.xml", "bare.xml")
+
+
+ELLIPSE = """
+<mujoco>
+  <worldbody>
+    <geom name="ball" type="ellipsoid" size=".03 .03 .03" contype="0" conaffinity="0"/>
+    <geom name="roll" type="cylinder" size=".03 .1" zaxis="0 1 0" pos="0 1 0" contype="0" conaffinity="0"/>
+    <site name="a" pos="-.1 0 0"/> <site name="a2" pos="-.1 1 0"/>
+    <site name="up" pos="0 0 .05"/> <site name="up2" pos="0 1 .05"/>
+    <body><joint name="turn" axis="0 -1 0" limited="true" range="-60 60"/>
+      <geom size=".005" mass="1" contype="0" conaffinity="0"/>
+      <site name="b" pos=".1 0 0"/> <site name="b2" pos=".1 1 0"/></body>
+  </worldbody>
+  <tendon>
+    <spatial name="over_ball"><site site="a"/><site site="b"/></spatial>
+    <spatial name="over_roll"><site site="a2"/><geom geom="roll" sidesite="up2"/><site site="b2"/></spatial>
+  </tendon>
+  <actuator>
+    <muscle name="over_ball" tendon="over_ball" lengthrange=".1 .3"/>
+    <muscle name="over_roll" tendon="over_roll" lengthrange=".1 .3"/>
+  </actuator>
+  <custom>
+    <tuple name="mjwrap_over_ball">
+      <element objtype="actuator" objname="over_ball"/>
+      <element objtype="site" objname="a"/> <element objtype="geom" objname="ball"/>
+      <element objtype="site" objname="up" prm="1"/> <element objtype="site" objname="b"/>
+    </tuple>
+  </custom>
+</mujoco>
+"""
+
+
+def write_tables(folder: Path, offset: float) -> list[object]:
+    """Files as OpenSim writes them of a string over a circle of 0.03 m that passes it on the side of +z."""
+    time = np.linspace(0.0, 1.0, 21)
+    angle = np.radians(-50.0 + 60.0 * time)  # positive: the far end goes up
+    straight = 2.0 * np.sqrt(0.1**2 - 0.03**2)
+    arc = 0.03 * (np.pi - angle - 2.0 * np.arccos(0.3))
+    assert (arc > 0.0).all()
+    lengths = straight + arc + offset
+    names = ("/forceset/over_ball", "/forceset/over_roll")
+    motion = mw.Table(time, ("/jointset/hinge/turn/value",), np.degrees(angle)[:, None], {"inDegrees": "yes"})
+    mw.write_table(folder / "states.sto", motion)
+    mw.write_table(folder / "length.sto", mw.Table(time, names, np.stack([lengths, lengths], axis=1)))
+    arms = np.full((21, 2), 0.03)
+    arms[7, 1] += 0.001  # a fault to be found
+    mw.write_table(folder / "arm.sto", mw.Table(time, names, arms))
+    return ["--states", folder / "states.sto", "--lengths", folder / "length.sto", "--moment-arms",
+            f"turn={folder / 'arm.sto'}"]  # fmt: skip
+
+
+def test_tables_of_another_program_are_compared_with_both(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "m.xml"
+    model.write_text(ELLIPSE)
+    given = write_tables(tmp_path, 0.002)
+    page = tmp_path / "p.html"
+    ran = compare(capsys, model, "--samples", 5, "--duration", 0, "--json", "-", "--report", page, *given)
+    assert ran.code == 0, ran.err
+    found = {(d["muscle"], d["program"], d["quantity"]): d for d in json.loads(ran.out)["tables"]}
+    assert set(found) == {
+        (muscle, program, quantity)
+        for muscle, program in (("over_ball", "mjwrap"), ("over_roll", "mjwrap"), ("over_roll", "MuJoCo"))
+        for quantity in ("length", "moment arm")
+    }  # the tendon of over_ball is straight: only a place for the actuator
+    for (muscle, _, quantity), told in found.items():
+        assert told["rows"] == 21
+        if quantity == "length":
+            assert told["mean"] == pytest.approx(-0.002, abs=1e-8)  # the file has eight digits
+            assert told["spread"] < 1e-8
+        elif muscle == "over_roll":
+            assert told["largest"] == pytest.approx(-0.001, abs=1e-8)
+            assert told["time"] == pytest.approx(0.35)
+        else:
+            assert abs(told["largest"]) < 1e-8
+    assert "moment arm, turn" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--lengths", "length.sto"], "need --states"),
+        (["--states", "states.sto"], "needs --lengths or --moment-arms"),
+        (["--states", "states.sto", "--moment-arms", "arm.sto"], "write JOINT=FILE"),
+        (["--states", "states.sto", "--moment-arms", "knee=arm.sto"], "no hinge or slide 'knee'"),
+        (["--states", "states.sto", "--lengths", "states.sto"], "has no column for any of the muscles"),
+        (["--states", "half.sto", "--lengths", "length.sto"], "the motion from 0 to 0.5 s"),
+    ],
+)
+def test_tables_that_do_not_fit_are_refused(
+    arguments: list[str], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    (tmp_path / "m.xml").write_text(ELLIPSE)
+    write_tables(tmp_path, 0.0)
+    states = mw.read_table(tmp_path / "states.sto")
+    mw.write_table(
+        tmp_path / "half.sto", mw.Table(states.time[:11], states.names, states.values[:11], states.metadata)
+    )
+    monkeypatch.chdir(tmp_path)
+    ran = compare(capsys, "m.xml", "--samples", 3, "--duration", 0, *arguments)
+    assert ran.code == 2
+    assert reason in ran.err
+    assert len(said(ran)) == 1

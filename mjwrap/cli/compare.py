@@ -22,14 +22,22 @@ from typing import Any
 
 import mujoco
 
-from mjwrap import MuscleSystem
+from mjwrap import MuscleSystem, Table, read_table
 from mjwrap.cli.arguments import at_least, not_negative
-from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_poses
+from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_poses, tell_tables
 from mjwrap.cli.errors import FAULTS, UserError
 from mjwrap.cli.models import load, start_keyframe, start_state
 from mjwrap.cli.output import Output, Report, add_json
 from mjwrap.cli.progress import need_matplotlib, progress_bar
-from mjwrap.comparison import PoseComparison, compare_motion, compare_poses, verdict, with_native_laws
+from mjwrap.cli.states import read_states
+from mjwrap.comparison import (
+    PoseComparison,
+    compare_motion,
+    compare_poses,
+    compare_tables,
+    verdict,
+    with_native_laws,
+)
 from mjwrap.excitation import Excitation
 
 
@@ -72,6 +80,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--law", choices=("mujoco", "declared"), default="mujoco", help="in mjwrap's run: MuJoCo's own curves, so that "
         "both differ by the path alone, or the declared law")  # fmt: skip
+    add("--states", metavar="FILE", help="a motion (.sto, .mot, .csv, .npz) at which other tables were made")
+    add("--lengths", metavar="FILE", help="OpenSim's table of lengths along --states, to compare with both")
+    add("--moment-arms", nargs="+", default=[], metavar="JOINT=FILE", help="OpenSim's tables of moment arms there")
     add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
     add("--report", metavar="FILE.html", help="a page with a table of all muscles, plots and verdicts")
     add("--csv", metavar="FILE.csv", help="a row for every muscle and pose")
@@ -91,6 +102,7 @@ def execute(options: argparse.Namespace) -> int:
     page = Output(options.report, "--report", (".html", ".htm")) if options.report else None
     table = Output(options.csv, "--csv", (".csv",)) if options.csv else None
     report = Report(options.json)
+    given = read_tables(options, model, muscles, start)
     if plot is not None or page is not None:
         need_matplotlib()
     rows = PoseTable(table) if table is not None else None
@@ -105,6 +117,8 @@ def execute(options: argparse.Namespace) -> int:
     if rows is not None:
         rows.close()
 
+    tables = compare_tables(model, *given) if given is not None else []
+    tell_tables(report.say, tables)
     motion = None
     if options.duration > 0.0:
         moved, changed = with_native_laws(model) if options.law == "mujoco" else (model, [])
@@ -124,10 +138,33 @@ def execute(options: argparse.Namespace) -> int:
     for what, path in (("plot", options.plot), ("report", options.report), ("csv", options.csv)):
         if path:
             report.say(f"{what + ':':10s} {path}")
-    given = {name: getattr(options, name) for name in ("model", "samples", "bases", "seed")}
-    report.finish({**given, **as_values(found, verdicts, motion)})
+    asked = {name: getattr(options, name) for name in ("model", "samples", "bases", "seed")}
+    report.finish({**asked, **as_values(found, verdicts, motion), "tables": [vars(d) for d in tables]})
     wrong = found.at_fault or any(jump.program == "mjwrap" for jump in found.jumps)
     return FAULTS if options.check and wrong else 0
+
+
+Given = tuple[Any, Any, Table | None, dict[str, Table]]  # time, qpos, lengths, moment arms by joint
+
+
+def read_tables(
+    options: argparse.Namespace, model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjData
+) -> Given | None:
+    """Return the motion and the tables of another program that were asked for, or None."""
+    if not options.lengths and not options.moment_arms:
+        if options.states:
+            raise UserError("--states needs --lengths or --moment-arms: tables to compare at these states")
+        return None
+    if not options.states:
+        raise UserError("--lengths and --moment-arms need --states: the motion at which they were computed")
+    states = read_states(model, muscles, start, read_table(options.states))
+    arms = {}
+    for entry in options.moment_arms:
+        joint, mark, file = entry.partition("=")
+        if not mark or not joint or not file:
+            raise UserError(f"--moment-arms '{entry}': write JOINT=FILE")
+        arms[joint] = read_table(file)
+    return states.time, states.qpos, read_table(options.lengths) if options.lengths else None, arms
 
 
 def compare_all(

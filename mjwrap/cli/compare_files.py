@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -11,7 +11,7 @@ import numpy as np
 
 import mjwrap
 from mjwrap.cli.output import Output
-from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, Verdict
+from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, TableDifference, Verdict
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch
 from mjwrap.comparison.verdict import Extreme, differences, outcomes
@@ -125,6 +125,19 @@ def where(extreme: Extreme) -> str:
         return f"{extreme.motion} = {extreme.at:.6f}"
     told = ", ".join(f"{name} = {value:.4f}" for name, value in list(extreme.joints.items())[:6])
     return f"{extreme.motion} {extreme.at:g} ({told}{', ...' if len(extreme.joints) > 6 else ''})"
+
+
+def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
+    """Say how far both programs are from another program's tables, the worst first."""
+    if not tables:
+        return
+    wide = max(6, *(len(d.muscle) for d in tables))
+    say("\nbeside the given tables: program minus table, in mm; spread: rms without the mean")
+    say(f"{'muscle':{wide}}  program  quantity                     rows      mean    spread   largest  at [s]")
+    for d in sorted(tables, key=lambda d: -d.spread):
+        what = f"moment arm, {d.about}" if d.about else "length"
+        numbers = "".join(f"{1e3 * x:>10.4f}" for x in (d.mean, d.spread, d.largest))
+        say(f"{d.muscle:{wide}}  {d.program:7s}  {what:25s}  {d.rows:6d}{numbers}  {d.time:g}")
 
 
 def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: list[str]) -> None:

@@ -18,7 +18,7 @@ import mjwrap
 from mjwrap.cli.compare_files import TITLES, where
 from mjwrap.cli.output import Output
 from mjwrap.cli.plot_compare import COLOURS, draw_motion, draw_sweep
-from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, Verdict
+from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, TableDifference, Verdict
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; }
@@ -55,6 +55,7 @@ def write_page(
     found: PoseComparison,
     verdicts: dict[str, Verdict],
     motion: MotionDifference | None,
+    tables: Sequence[TableDifference] = (),
 ) -> None:
     """Write the page and give the file its name; command: the line that makes it again."""
     versions = f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__}"
@@ -65,6 +66,8 @@ def write_page(
         "<h2>All muscles</h2>",
         _muscles(found, verdicts),
     ]
+    if tables:
+        parts += ["<h2>Beside the given tables</h2>", _tables(tables)]
     if motion is not None and motion.difference.size:
         parts += ["<h2>Motion of both with the same controls</h2>", _motion(motion)]
     parts += ["<h2>Muscle by muscle</h2>", _details(found, verdicts), _left_out(found), _key()]
@@ -145,6 +148,18 @@ def _muscles(found: PoseComparison, verdicts: dict[str, Verdict]) -> str:
         "jumps MuJoCo", "jumps mjwrap",
     )  # fmt: skip
     return _table(heads, [row(name, s) for name, s in found.muscles.items()])
+
+
+def _tables(tables: Sequence[TableDifference]) -> str:
+    """Return the table of differences from another program's tables."""
+    heads = ("<muscle", "<program", "<quantity", "rows", "mean [mm]", "rms without the mean [mm]", "largest [mm]", "at [s]")
+    rows = [
+        [_text(d.muscle), d.program, _text(f"moment arm, {d.about}" if d.about else "length"), f"{d.rows}"]
+        + [f"{1e3 * x:+.4f}" for x in (d.mean, d.spread, d.largest)]
+        + [f"{d.time:g}"]
+        for d in sorted(tables, key=lambda d: -d.spread)
+    ]
+    return f"<p>Program minus table.</p>{_table(heads, rows)}"
 
 
 def _bar(s: MuscleSummary) -> str:

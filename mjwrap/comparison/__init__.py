@@ -10,6 +10,7 @@ from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.motion import MotionDifference, compare_motion, with_native_laws
 from mjwrap.comparison.run import PoseComparison, compare_poses
 from mjwrap.comparison.sentences import Verdict, verdict
+from mjwrap.comparison.tables import TableDifference, compare_tables
 from mjwrap.comparison.verdict import AGREE, MuscleSummary, Outcome
 
 __all__ = [
@@ -19,9 +20,11 @@ __all__ = [
     "MuscleSummary",
     "Outcome",
     "PoseComparison",
+    "TableDifference",
     "Verdict",
     "compare_motion",
     "compare_poses",
+    "compare_tables",
     "verdict",
     "with_native_laws",
 ]

@@ -1,0 +1,139 @@
+"""Lengths and moment arms that another program has computed, beside MuJoCo's and mjwrap's at the same poses.
+
+OpenSim's MuscleAnalysis writes such tables: lengths of all muscles over time, and moment arms about one coordinate in
+each file. Models of the same person in two programs seldom have the same zero of length, so the difference is told
+with and without its mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.comparison.motion import pristine
+from mjwrap.comparison.twins import Comparer
+from mjwrap.errors import TableError
+from mjwrap.files import Table
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TableDifference:
+    """How far one program is from a table, for one muscle: program minus table over all rows where it has a path.
+
+    quantity: "length" [m] or "moment arm" [m]; about: the joint of the moment arm, or ""; rows: how many count; mean,
+    rms, spread (rms about the mean), largest, and time [s] and the two values there.
+    """
+
+    muscle: str
+    program: str
+    quantity: str
+    about: str
+    rows: int
+    mean: float
+    rms: float
+    spread: float
+    largest: float
+    time: float
+    value: float
+    table: float
+
+
+def compare_tables(
+    model: mujoco.MjModel,
+    time: Array,
+    qpos: Array,
+    lengths: Table | None = None,
+    moment_arms: Mapping[str, Table] | None = None,
+) -> list[TableDifference]:
+    """Return how far MuJoCo's tendons and mjwrap's paths are from tables, muscle by muscle.
+
+    time (T,), qpos (T, nq): the motion; a table's rows are looked up in it, with straight lines between. Columns are
+    muscles, a path before the name is left out; moment_arms: by the joint's name, positive where the muscle's tension
+    increases the coordinate. A tendon that only holds a place for another route is not compared. Raises `TableError`
+    where a table has none of the muscles, or rows outside the motion.
+    """
+    model = pristine(model)
+    found: list[TableDifference] = []
+    if lengths is not None:
+        found += _compare(model, time, qpos, lengths, "")
+    for joint, table in (moment_arms or {}).items():
+        found += _compare(model, time, qpos, table, joint)
+    return found
+
+
+def _compare(model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str) -> list[TableDifference]:
+    dof = _dof(model, joint) if joint else -1
+    muscles = MuscleSystem(model)
+    known = [*muscles.names, *muscles.native]
+    columns = {name.rsplit("/", 1)[-1]: table[name] for name in table.names}
+    if not set(columns) & set(known):
+        raise TableError(
+            f"'{table.source}' has no column for any of the muscles; columns: {', '.join(list(columns)[:8])}; "
+            f"muscles: {', '.join(known[:8])}"
+        )
+    slack = 1e-6 * float(np.ptp(time))  # times are written with a few digits
+    if table.time[0] < time[0] - slack or table.time[-1] > time[-1] + slack:
+        raise TableError(
+            f"'{table.source}' goes from {table.time[0]:g} to {table.time[-1]:g} s, the motion from {time[0]:g} to "
+            f"{time[-1]:g} s"
+        )
+    poses = np.stack([np.interp(table.time, time, column) for column in qpos.T], axis=1)
+    comparer = Comparer(muscles, known)
+    native = {name: t for name, t in _tendons(muscles).items() if name not in comparer.left_out}
+    values = {("MuJoCo", name): np.full(len(poses), np.nan) for name in native}
+    values |= {("mjwrap", name): np.full(len(poses), np.nan) for name in muscles.names}
+    for k, pose in enumerate(poses):
+        length, _, jacobian = comparer.native_at(pose, np.zeros(model.nv))
+        own_length, _, own_jacobian, status = comparer.mjwrap_at(pose, np.zeros(model.nv))
+        for name, tendon in native.items():
+            values["MuJoCo", name][k] = length[tendon] if dof < 0 else -jacobian[tendon, dof]
+        for i, name in enumerate(muscles.names):
+            if status[i] == 0:
+                values["mjwrap", name][k] = own_length[i] if dof < 0 else -own_jacobian[i, dof]
+    told = [
+        _difference(name, program, joint, table.time, value, columns[name])
+        for (program, name), value in values.items()
+        if name in columns and np.isfinite(value - columns[name]).any()
+    ]
+    return sorted(told, key=lambda d: (known.index(d.muscle), d.program))
+
+
+def _difference(
+    muscle: str, program: str, joint: str, time: Array, value: Array, wanted: Array
+) -> TableDifference:
+    good = np.isfinite(value - wanted)
+    gap = (value - wanted)[good]
+    k = int(np.argmax(np.abs(gap)))
+    at = tuple(float(x[good][k]) for x in (time, value, wanted))
+    rms, quantity = float(np.sqrt(np.mean(gap**2))), "moment arm" if joint else "length"
+    return TableDifference(
+        muscle, program, quantity, joint, len(gap), float(gap.mean()), rms, float(np.std(gap)), float(gap[k]), *at
+    )
+
+
+def _tendons(muscles: MuscleSystem) -> dict[str, int]:
+    """Return the tendon of every muscle that has one, those that stay native among them."""
+    model = muscles.model
+    found = {m.name: m.tendon for m in muscles.declarations if m.tendon >= 0}
+    for name in muscles.native:
+        actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+        if actuator >= 0 and int(model.actuator_trntype[actuator]) == int(mujoco.mjtTrn.mjTRN_TENDON):
+            found[name] = int(model.actuator_trnid[actuator, 0])
+    return found
+
+
+def _dof(model: mujoco.MjModel, joint: str) -> int:
+    """Return the degree of freedom of a hinge or slide."""
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+    single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    if index < 0 or int(model.jnt_type[index]) not in single:
+        names = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) in single]
+        raise TableError(f"no hinge or slide '{joint}' for a table of moment arms; joints: {', '.join(names)}")
+    return int(model.jnt_dofadr[index])
