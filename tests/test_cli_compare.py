@@ -232,7 +232,7 @@ ELLIPSE = """
 def write_tables(folder: Path, offset: float) -> list[object]:
     """Files as OpenSim writes them of a string over a circle of 0.03 m that passes it on the side of +z."""
     time = np.linspace(0.0, 1.0, 21)
-    angle = np.radians(-50.0 + 60.0 * time)  # positive: the far end goes up
+    angle = np.radians(2.0 + 30.0 * time)  # positive: the far end goes up
     straight = 2.0 * np.sqrt(0.1**2 - 0.03**2)
     arc = 0.03 * (np.pi - angle - 2.0 * np.arccos(0.3))
     assert (arc > 0.0).all()

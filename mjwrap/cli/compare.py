@@ -8,8 +8,9 @@ controls.
 
 Examples:
   mjwrap compare models/elbow/elbow.xml --plot compare.png
-  mjwrap compare myo_sim:myoarm_r --bases 8 --samples 41 --report arm.html
-  mjwrap compare myo_sim:myoarm_r --samples 51 --bases 4 --muscles 'LAT*' DELT1 --json compare.json
+  mjwrap compare myo_sim:myoarm_r --report arm.html
+  mjwrap compare arm.xml --states motion.mot --lengths lengths.sto --moment-arms elbow=arms.sto
+  mjwrap compare myo_sim:myoarm_r --samples 101 --bases 1 --muscles 'LAT*' DELT1 --json compare.json
 """
 
 from __future__ import annotations
@@ -49,14 +50,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--samples",
         type=at_least(3),
-        default=101,
+        default=41,
         metavar="N",
         help="poses of a sweep, and random ones (%(default)s)",
     )
     add(
         "--bases",
         type=at_least(0),
-        default=1,
+        default=8,
         metavar="N",
         help="further poses to sweep around (%(default)s)",
     )
@@ -82,7 +83,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "both differ by the path alone, or the declared law")  # fmt: skip
     add("--states", metavar="FILE", help="a motion (.sto, .mot, .csv, .npz) at which other tables were made")
     add("--lengths", metavar="FILE", help="OpenSim's table of lengths along --states, to compare with both")
-    add("--moment-arms", nargs="+", default=[], metavar="JOINT=FILE", help="OpenSim's tables of moment arms there")
+    add(
+        "--moment-arms",
+        nargs="+",
+        default=[],
+        metavar="JOINT=FILE",
+        help="OpenSim's tables of moment arms there",
+    )
     add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
     add("--report", metavar="FILE.html", help="a page with a table of all muscles, plots and verdicts")
     add("--csv", metavar="FILE.csv", help="a row for every muscle and pose")
@@ -132,9 +139,8 @@ def execute(options: argparse.Namespace) -> int:
     if page is not None:
         from mjwrap.cli.compare_page import write_page
 
-        write_page(
-            page, options.model, shlex.join(["mjwrap", "compare", *options.given]), found, verdicts, motion
-        )
+        command = shlex.join(["mjwrap", "compare", *options.given])
+        write_page(page, options.model, command, found, verdicts, motion, tables)
     for what, path in (("plot", options.plot), ("report", options.report), ("csv", options.csv)):
         if path:
             report.say(f"{what + ':':10s} {path}")

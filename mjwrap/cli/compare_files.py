@@ -11,7 +11,16 @@ import numpy as np
 
 import mjwrap
 from mjwrap.cli.output import Output
-from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, TableDifference, Verdict
+from mjwrap.comparison import (
+    AGREE,
+    Jump,
+    MotionDifference,
+    MuscleSummary,
+    Outcome,
+    PoseComparison,
+    TableDifference,
+    Verdict,
+)
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch
 from mjwrap.comparison.verdict import Extreme, differences, outcomes
@@ -133,7 +142,9 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
         return
     wide = max(6, *(len(d.muscle) for d in tables))
     say("\nbeside the given tables: program minus table, in mm; spread: rms without the mean")
-    say(f"{'muscle':{wide}}  program  quantity                     rows      mean    spread   largest  at [s]")
+    say(
+        f"{'muscle':{wide}}  program  quantity                     rows      mean    spread   largest  at [s]"
+    )
     for d in sorted(tables, key=lambda d: -d.spread):
         what = f"moment arm, {d.about}" if d.about else "length"
         numbers = "".join(f"{1e3 * x:>10.4f}" for x in (d.mean, d.spread, d.largest))

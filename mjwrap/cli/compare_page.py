@@ -18,7 +18,16 @@ import mjwrap
 from mjwrap.cli.compare_files import TITLES, where
 from mjwrap.cli.output import Output
 from mjwrap.cli.plot_compare import COLOURS, draw_motion, draw_sweep
-from mjwrap.comparison import AGREE, Jump, MotionDifference, MuscleSummary, Outcome, PoseComparison, TableDifference, Verdict
+from mjwrap.comparison import (
+    AGREE,
+    Jump,
+    MotionDifference,
+    MuscleSummary,
+    Outcome,
+    PoseComparison,
+    TableDifference,
+    Verdict,
+)
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; }
@@ -152,7 +161,16 @@ def _muscles(found: PoseComparison, verdicts: dict[str, Verdict]) -> str:
 
 def _tables(tables: Sequence[TableDifference]) -> str:
     """Return the table of differences from another program's tables."""
-    heads = ("<muscle", "<program", "<quantity", "rows", "mean [mm]", "rms without the mean [mm]", "largest [mm]", "at [s]")
+    heads = (
+        "<muscle",
+        "<program",
+        "<quantity",
+        "rows",
+        "mean [mm]",
+        "rms without the mean [mm]",
+        "largest [mm]",
+        "at [s]",
+    )
     rows = [
         [_text(d.muscle), d.program, _text(f"moment arm, {d.about}" if d.about else "length"), f"{d.rows}"]
         + [f"{1e3 * x:+.4f}" for x in (d.mean, d.spread, d.largest)]

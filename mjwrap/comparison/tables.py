@@ -68,7 +68,9 @@ def compare_tables(
     return found
 
 
-def _compare(model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str) -> list[TableDifference]:
+def _compare(
+    model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str
+) -> list[TableDifference]:
     dof = _dof(model, joint) if joint else -1
     muscles = MuscleSystem(model)
     known = [*muscles.names, *muscles.native]
@@ -114,7 +116,16 @@ def _difference(
     at = tuple(float(x[good][k]) for x in (time, value, wanted))
     rms, quantity = float(np.sqrt(np.mean(gap**2))), "moment arm" if joint else "length"
     return TableDifference(
-        muscle, program, quantity, joint, len(gap), float(gap.mean()), rms, float(np.std(gap)), float(gap[k]), *at
+        muscle,
+        program,
+        quantity,
+        joint,
+        len(gap),
+        float(gap.mean()),
+        rms,
+        float(np.std(gap)),
+        float(gap[k]),
+        *at,
     )
 
 
@@ -135,5 +146,7 @@ def _dof(model: mujoco.MjModel, joint: str) -> int:
     single = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     if index < 0 or int(model.jnt_type[index]) not in single:
         names = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) in single]
-        raise TableError(f"no hinge or slide '{joint}' for a table of moment arms; joints: {', '.join(names)}")
+        raise TableError(
+            f"no hinge or slide '{joint}' for a table of moment arms; joints: {', '.join(names)}"
+        )
     return int(model.jnt_dofadr[index])
