@@ -203,6 +203,23 @@ class MuJoCoMuscle:
 
 
 @dataclass(frozen=True)
+class ActuatorForce:
+    """The force that MuJoCo computes for an actuator of any kind, whose path is mjwrap's; no tension here."""
+
+    code: ClassVar[int] = muscle.PATH_ACTUATOR
+    law: ClassVar[str] = "mujoco"
+
+    @property
+    def states(self) -> int:
+        """Return 0: its states are MuJoCo's."""
+        return 0
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameter of `path_actuator` in `mjwrap/kernels/muscle.py`: no force."""
+        return (0.0,)
+
+
+@dataclass(frozen=True)
 class PathActuator:
     """Tension = activation x optimal force, without any dynamics (OpenSim's PathActuator, tension only).
 

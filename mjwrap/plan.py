@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels import coupling, dynamics, layout, muscle
 from mjwrap.mjcf import MuscleDeclaration, Node, keeps_state
+from mjwrap.muscles import ActuatorForce
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,6 +35,9 @@ class Plan:
     form: Ints  # (n,) of the activation dynamics
     times: Array  # (n, 3) activation and deactivation time constants [s], smoothness
     integrates: bool  # whether mjwrap integrates a state itself
+    output: (
+        Ints  # (n,) of the actuator whose length, velocity and moment mjwrap writes; -1 where wrenches act
+    )
 
 
 def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, int, float, float]:
@@ -42,13 +46,19 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
         direct = declared.parameters.states == 0
         return (dynamics.DIRECT if direct else dynamics.OWN), 0, 0, -np.inf, np.inf
     actuator = declared.actuator
+    if isinstance(declared.parameters, ActuatorForce) and not int(model.actuator_ctrlnum[actuator]):
+        return dynamics.DIRECT, 0, 0, -np.inf, np.inf
     states, control = int(model.actuator_actadr[actuator]), int(model.actuator_ctrladr[actuator])
     low, high = -np.inf, np.inf
     if model.actuator_ctrllimited[control]:
         low, high = (float(x) for x in model.actuator_ctrlrange[control])
-    if keeps_state(model, actuator):
+    if isinstance(declared.parameters, ActuatorForce):
+        kept, single = False, int(model.actuator_actnum[actuator]) > 0
+    else:
+        kept, single = keeps_state(model, actuator), int(model.actuator_actnum[actuator]) == 1
+    if kept:
         return dynamics.KEPT, states, control, low, high
-    if int(model.actuator_actnum[actuator]) == 1:
+    if single:
         return dynamics.FROM_ACT, states, control, low, high
     return dynamics.FROM_CTRL, 0, control, low, high
 
@@ -67,6 +77,15 @@ def kernel_rows(node: Node) -> list[Array]:
     twin = row.copy()
     twin[layout.TWIN] = 1.0
     return [row, twin]
+
+
+def last_dofs(model: mujoco.MjModel) -> Ints:
+    """Return the last degree of freedom that moves each body (nbody,), -1 for those that stand still."""
+    last = np.full(model.nbody, -1, dtype=np.int64)
+    for body in range(1, model.nbody):
+        first, count = int(model.body_dofadr[body]), int(model.body_dofnum[body])
+        last[body] = first + count - 1 if count else last[model.body_parentid[body]]
+    return last
 
 
 def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
@@ -90,6 +109,10 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
             weights.append(route.weight)
     n = len(muscles)
     params = np.zeros((n, muscle.PARAMS))
+    outputs = [
+        int(model.actuator_outadr[m.actuator]) if isinstance(m.parameters, ActuatorForce) else -1
+        for m in muscles
+    ]
     sources = [_source(model, declared) for declared in muscles]
     for m, declared in enumerate(muscles):
         values = declared.parameters.row()
@@ -109,5 +132,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         ctrl_high=np.array([s[4] for s in sources], dtype=np.float64),
         form=np.array([declared.activation.form for declared in muscles], dtype=np.int64),
         times=np.array([declared.activation.row() for declared in muscles], dtype=np.float64).reshape(-1, 3),
+        output=np.array(outputs, dtype=np.int64),
         integrates=any(s[0] in (dynamics.OWN, dynamics.KEPT) for s in sources),
     )

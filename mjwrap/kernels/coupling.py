@@ -171,6 +171,8 @@ def body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench
             wrench[b, i] = 0.0
     for c in range(routes.shape[0]):
         force = weights[c] * tension[routes[c, R_MUSCLE]]
+        if force == 0.0:
+            continue
         first = routes[c, R_LO] + c
         for j in range(first, first + seg_count[c]):
             near = end_body(routes, links, c, int(seg[j, G_NEAR]))
@@ -180,75 +182,6 @@ def body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench
             fx, fy, fz = force * seg[j, G_E], force * seg[j, G_E + 1], force * seg[j, G_E + 2]
             _pull(wrench, near, seg, j, G_A, xipos, fx, fy, fz)
             _pull(wrench, far, seg, j, G_B, xipos, -fx, -fy, -fz)
-
-
-@jit
-def _add_row(sign, body, seg, j, column, row, jacobian, dofs, body_parentid, cdof, subtree_com, root):
-    """Add sign e . dp/dq of a segment end as a point of `body` to a row of the Jacobian, up the chain of dofs."""
-    body_dofadr, body_dofnum, dof_parentid = dofs
-    while body > 0 and body_dofnum[body] == 0:
-        body = body_parentid[body]
-    if body == 0:
-        return
-    rx = seg[j, column] - subtree_com[root, 0]
-    ry = seg[j, column + 1] - subtree_com[root, 1]
-    rz = seg[j, column + 2] - subtree_com[root, 2]
-    ex, ey, ez = sign * seg[j, G_E], sign * seg[j, G_E + 1], sign * seg[j, G_E + 2]
-    dof = body_dofadr[body] + body_dofnum[body] - 1
-    while dof >= 0:
-        wx, wy, wz = cdof[dof, 0], cdof[dof, 1], cdof[dof, 2]
-        jacobian[row, dof] += (
-            ex * (cdof[dof, 3] + wy * rz - wz * ry)
-            + ey * (cdof[dof, 4] + wz * rx - wx * rz)
-            + ez * (cdof[dof, 5] + wx * ry - wy * rx)
-        )
-        dof = dof_parentid[dof]
-
-
-@jit
-def length_jacobian(
-    routes, weights, links, seg, seg_count, dofs, body_parentid, body_rootid, cdof, subtree_com, jacobian
-):
-    """Write dl/dq (n, nv) of every muscle, all coordinates in one pass over the straight segments (17)."""
-    for m in range(jacobian.shape[0]):
-        for i in range(jacobian.shape[1]):
-            jacobian[m, i] = 0.0
-    for c in range(routes.shape[0]):
-        row, weight = routes[c, R_MUSCLE], weights[c]
-        first = routes[c, R_LO] + c
-        for j in range(first, first + seg_count[c]):
-            near = end_body(routes, links, c, int(seg[j, G_NEAR]))
-            far = end_body(routes, links, c, int(seg[j, G_FAR]))
-            if near == far:
-                continue
-            _add_row(
-                weight,
-                far,
-                seg,
-                j,
-                G_B,
-                row,
-                jacobian,
-                dofs,
-                body_parentid,
-                cdof,
-                subtree_com,
-                body_rootid[far],
-            )
-            _add_row(
-                -weight,
-                near,
-                seg,
-                j,
-                G_A,
-                row,
-                jacobian,
-                dofs,
-                body_parentid,
-                cdof,
-                subtree_com,
-                body_rootid[near],
-            )
 
 
 # ------------------------------------------------------------------ xfrc_applied, shared with others

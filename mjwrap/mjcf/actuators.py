@@ -66,13 +66,26 @@ def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
     return None
 
 
-def curves_reason(model: mujoco.MjModel, actuator: int) -> str | None:
-    """Return why a muscle actuator's own curves cannot be computed along a path, or None."""
+def tendon_reason(model: mujoco.MjModel, actuator: int) -> str | None:
+    """Return why an actuator pulls no spatial tendon, or None."""
     if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
         return "it does not pull a tendon"
+    return "its tendon is fixed, not spatial" if pulled_tendon(model, actuator) < 0 else None
+
+
+def path_reason(model: mujoco.MjModel, rest: mujoco.MjData, actuator: int) -> str | None:
+    """Return why an actuator of any kind must keep MuJoCo's path, or None. rest: kinematics of the reference pose."""
+    return tendon_reason(model, actuator) or _inside_reason(
+        model, rest, int(model.actuator_trnid[actuator, 0])
+    )
+
+
+def curves_reason(model: mujoco.MjModel, actuator: int) -> str | None:
+    """Return why a muscle actuator's own curves cannot be computed along a path, or None."""
+    astray = tendon_reason(model, actuator)
+    if astray is not None:
+        return astray
     tendon = pulled_tendon(model, actuator)
-    if tendon < 0:
-        return "its tendon is fixed, not spatial"
     if float(model.actuator_gear[int(model.actuator_outadr[actuator]), 0]) <= 0.0:
         return "its gear is not positive, so it pushes"
     if model.tendon_actfrclimited[tendon]:

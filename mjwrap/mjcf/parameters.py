@@ -7,10 +7,10 @@ import numpy as np
 
 from mjwrap.activation import FORMS, ActivationDynamics
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.actuators import curves_reason, is_muscle, keeps_state, mujoco_law
+from mjwrap.mjcf.actuators import curves_reason, is_muscle, keeps_state, mujoco_law, tendon_reason
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.surfaces import SIZES
-from mjwrap.muscles import TENDONS, DeGrooteFregly2016, Law, Millard2012, PathActuator
+from mjwrap.muscles import TENDONS, ActuatorForce, DeGrooteFregly2016, Law, Millard2012, PathActuator
 
 OBJ = mujoco.mjtObj
 TIMES, SMOOTHING = "activation_time_constants", "activation_smoothing"
@@ -78,10 +78,13 @@ def choose_law(given: Given) -> str:
     return "mujoco"
 
 
-def build_law(model: mujoco.MjModel, law: str, actuator: int, given: Given, tendon: str | None) -> Law:
+def build_law(
+    model: mujoco.MjModel, law: str, actuator: int, given: Given, tendon: str | None, native: bool = False
+) -> Law:
     """Return a law's dataclass from the numerics of a tuple, or from its muscle actuator for MuJoCo's own.
 
-    tendon: "rigid" or "elastic", or None where the tuple does not say; only laws with a tendon know it.
+    tendon: "rigid" or "elastic", or None where the tuple does not say; only laws with a tendon know it. native: the
+    force of MuJoCo's own is what it computes for the actuator, of any kind.
     """
     if law not in LAWS:
         raise ModelError(f"law '{law}' does not exist; laws: {listed(LAWS)}")
@@ -109,6 +112,11 @@ def build_law(model: mujoco.MjModel, law: str, actuator: int, given: Given, tend
         )
     if law == "path_actuator":
         return PathActuator(given["optimal_force"][0])
+    if native and actuator >= 0:
+        astray = tendon_reason(model, actuator)
+        if astray is not None:
+            raise ModelError(f"law 'mujoco' cannot be used with its actuator: {astray}")
+        return ActuatorForce()
     if actuator < 0 or not is_muscle(model, actuator):
         raise ModelError(
             f"law 'mujoco' needs a muscle actuator in the tuple; laws that do not: {_without('mujoco')}"

@@ -5,22 +5,25 @@ from __future__ import annotations
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, pulled_tendon
+from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, path_reason, pulled_tendon
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.tuples import read_tuple
+from mjwrap.muscles import ActuatorForce
 
 OBJ = mujoco.mjtObj
 
 
-def read_declarations(model: mujoco.MjModel) -> Declarations:
+def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> Declarations:
     """Read every muscle that a model declares, in the order of its actuators, then of tuples without an actuator.
 
-    Raises `ModelError` for a declaration that cannot be understood; native muscle actuators that mjwrap cannot take
-    over are left to MuJoCo and named in `native`.
+    transmission: MuJoCo computes the forces of its own muscles (`ActuatorForce`) and of all other actuators on spatial
+    tendons, which then count as muscles too. Raises `ModelError` for a declaration that cannot be understood; native
+    muscle actuators that mjwrap cannot take over, or other actuators whose path it cannot, are left to MuJoCo and
+    named in `native`.
     """
-    by_actuator, free = _read_tuples(model)
+    by_actuator, free = _read_tuples(model, transmission)
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
     muscles: list[MuscleDeclaration] = []
@@ -28,10 +31,10 @@ def read_declarations(model: mujoco.MjModel) -> Declarations:
     for actuator in range(model.nactuator):
         if actuator in by_actuator:
             muscles.append(by_actuator[actuator])
-        elif is_muscle(model, actuator):
-            reason = native_reason(model, rest, actuator)
+        elif is_muscle(model, actuator) or (transmission and pulled_tendon(model, actuator) >= 0):
+            reason = (path_reason if transmission else native_reason)(model, rest, actuator)
             if reason is None:
-                muscles.append(_read_native(model, actuator))
+                muscles.append(_read_native(model, actuator, transmission))
             else:
                 native[name_of(model, OBJ.mjOBJ_ACTUATOR, actuator)] = reason
     taken = [muscle.name for muscle in muscles]
@@ -45,7 +48,9 @@ def read_declarations(model: mujoco.MjModel) -> Declarations:
     return Declarations(muscles + free, native)
 
 
-def _read_tuples(model: mujoco.MjModel) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
+def _read_tuples(
+    model: mujoco.MjModel, transmission: bool
+) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
     """Return the muscles of all mjwrap tuples: by actuator, and those without one."""
     by_actuator: dict[int, MuscleDeclaration] = {}
     named_by: dict[int, str] = {}
@@ -54,7 +59,7 @@ def _read_tuples(model: mujoco.MjModel) -> tuple[dict[int, MuscleDeclaration], l
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
         if "mjwrap" not in tuple_name:
             continue
-        muscle = read_tuple(model, index)
+        muscle = read_tuple(model, index, transmission)
         if muscle.actuator < 0:
             free.append(muscle)
         elif muscle.actuator in by_actuator:
@@ -68,10 +73,10 @@ def _read_tuples(model: mujoco.MjModel) -> tuple[dict[int, MuscleDeclaration], l
     return by_actuator, free
 
 
-def _read_native(model: mujoco.MjModel, actuator: int) -> MuscleDeclaration:
+def _read_native(model: mujoco.MjModel, actuator: int, transmission: bool) -> MuscleDeclaration:
     name, tendon = name_of(model, OBJ.mjOBJ_ACTUATOR, actuator), pulled_tendon(model, actuator)
     try:
-        law = mujoco_law(model, actuator)
+        law = ActuatorForce() if transmission else mujoco_law(model, actuator)
     except ModelError as error:
         raise ModelError(f"muscle '{name}': {error}") from None
     return MuscleDeclaration(

@@ -43,8 +43,11 @@ class _Elements:
     texts: list[int] = field(default_factory=list)
 
 
-def read_tuple(model: mujoco.MjModel, index: int) -> MuscleDeclaration:
-    """Return the muscle that a tuple declares; `ModelError` names the tuple or muscle and the element at fault."""
+def read_tuple(model: mujoco.MjModel, index: int, transmission: bool = False) -> MuscleDeclaration:
+    """Return the muscle that a tuple declares; `ModelError` names the tuple or muscle and the element at fault.
+
+    transmission: for the law "mujoco" MuJoCo itself computes the force, of any actuator on a spatial tendon.
+    """
     tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
     try:
         found = _collect(model, index)
@@ -69,13 +72,14 @@ def read_tuple(model: mujoco.MjModel, index: int) -> MuscleDeclaration:
         stops = tendon_stops(model, tendon)
     routes = build_routes(model, name, stops)
     try:
-        unfit = unfit_reason(model, actuator) if actuator >= 0 else None
-        if unfit is not None:
-            raise ModelError(f"its actuator cannot be taken over: {unfit}")
         given = read_numerics(model, found.numerics)
         texts = read_texts(model, found.texts)
         law = texts.get(LAW) or choose_law(given)
-        parameters = build_law(model, law, actuator, given, texts.get(TENDON))
+        native = transmission and law == "mujoco"
+        unfit = unfit_reason(model, actuator) if actuator >= 0 and not native else None
+        if unfit is not None:
+            raise ModelError(f"its actuator cannot be taken over: {unfit}")
+        parameters = build_law(model, law, actuator, given, texts.get(TENDON), native)
         dynamics = activation_dynamics(model, actuator, given, texts.get(DYNAMICS))
     except ModelError as error:
         raise ModelError(f"muscle '{name}' (tuple '{tuple_name}'): {error}") from None

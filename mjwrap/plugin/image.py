@@ -15,14 +15,17 @@ from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import stage
 from mjwrap.plugin.callbacks.hooks import Entries
 from mjwrap.plugin.offsets import offsets
+from mjwrap.plugin.transmission import transmission_part
 
 Words = NDArray[np.int64]
 
 
 def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
-    """Return the ids of the bodies on which the muscles of a plan can act."""
-    ends = plan.routes[:, [coupling.R_FROM_BODY, coupling.R_TO_BODY]].ravel()
-    return np.unique(np.concatenate([plan.links[:, coupling.L_BODY], ends]))
+    """Return the ids of the bodies on which the muscles of a plan can act by wrenches."""
+    routes = plan.routes[plan.output[plan.routes[:, coupling.R_MUSCLE]] < 0]
+    stops = [plan.links[low:high, coupling.L_BODY] for low, high in routes[:, [coupling.R_LO, coupling.R_HI]]]
+    ends = routes[:, [coupling.R_FROM_BODY, coupling.R_TO_BODY]].ravel()
+    return np.unique(np.concatenate([*stops, ends]))
 
 
 def state_size(plan: Plan) -> int:
@@ -38,6 +41,7 @@ def state_size(plan: Plan) -> int:
 def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> dict[str, Any]:
     n, nodes, routes = plan.n, len(plan.node), len(plan.routes)
     groups = [int(model.actuator_group[m.actuator]) if m.actuator >= 0 else -1 for m in muscles]
+    groups = [bk.SILENT if out >= 0 else group for out, group in zip(plan.output, groups, strict=True)]
     arrays: dict[str, Any] = {name: getattr(plan, name) for name in bk.ARRAYS if hasattr(plan, name)}
     arrays |= {
         "group": np.array(groups, dtype=np.int64),
@@ -53,6 +57,7 @@ def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration])
         "lost": np.zeros(n, dtype=np.bool_),
         "written": np.zeros(model.nbody, dtype=np.bool_),
         "clock": np.zeros(bk.CLOCK),
+        "transmission": transmission_part(model, plan, muscles),
     }
     arrays |= {name: np.zeros((model.nbody, 6)) for name in ("wrench", "others", "mine", "total")}
     return {name: arrays.get(name, np.zeros(n)) for name in bk.ARRAYS}

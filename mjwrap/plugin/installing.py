@@ -6,12 +6,15 @@ import os
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import read_declarations, read_model
+from mjwrap.muscles import ActuatorForce
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.image import state_size
 from mjwrap.plugin.placeholders import drop_placeholders
+from mjwrap.plugin.transmission import check_room
 from mjwrap.takeover import Takeover
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
@@ -21,17 +24,21 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     """Give the muscles of an MjSpec to the engine plugin; return the compiled model, whose `mj_step` runs them.
 
     The spec itself is changed (an instance of the plugin, actuators without force), so that it can be compiled again,
-    attached and saved. mode: "wrench". keep_tendons: let MuJoCo go on computing, and drawing, the tendons that only say
-    where a muscle runs; else the returned model leaves out those that nothing else needs. Raises `ModelError` where its
-    muscles cannot be read, `VersionError` where MuJoCo is unknown.
+    attached and saved. mode: "wrench" adds the muscles' forces to xfrc_applied; "transmission" gives length, velocity
+    and moment along mjwrap's paths to every actuator on a spatial tendon whose force MuJoCo itself computes (muscles of
+    other laws act by wrenches). keep_tendons: let MuJoCo go on computing, and drawing, the tendons that only say where
+    a muscle runs; else the returned model leaves out those that nothing else needs. Raises `ModelError` where its
+    muscles cannot be read, or a moment has no room; `VersionError` where MuJoCo is unknown.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
-    if mode != "wrench":
-        raise ModelError(f"mode '{mode}' does not exist; modes: wrench")
+    if mode not in (reg.WRENCH, reg.TRANSMISSION):
+        raise ModelError(f"mode '{mode}' does not exist; modes: {reg.WRENCH}, {reg.TRANSMISSION}")
     reg.register()
     for element in [p for p in spec.plugins if p.plugin_name == reg.NAME and p.name == reg.INSTANCE]:
-        element.config = reg.configuration([], 1)  # installed before: read the muscles anew
+        for name in _claim(element).muscles:  # installed before: read the muscles anew
+            _wake(spec.actuator(name))
+        element.config = reg.configuration([], 1, mode)
     model = _compile(spec)
     if int(model.opt.disableflags) & _BOTH_OFF == _BOTH_OFF:
         raise ModelError(
@@ -39,17 +46,26 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
         )
     reg.hush_to_silence(model)
     with Takeover(model).suspended():
-        declared = read_declarations(model).muscles
-        taken = {name for p in spec.plugins if p.plugin_name == reg.NAME for name in _claimed(p)}
+        claims = [_claim(p) for p in spec.plugins if p.plugin_name == reg.NAME]
+        taken = {name: claim.mode for claim in claims for name in claim.muscles}
+        declared = [
+            muscle
+            for kind in dict.fromkeys([mode, *taken.values()])
+            for muscle in read_declarations(model, transmission=kind == reg.TRANSMISSION).muscles
+            if taken.get(muscle.name, mode) == kind
+        ]
         muscles = [muscle for muscle in declared if muscle.name not in taken]
         if not muscles and not taken:
-            raise ModelError("the model declares no muscle that mjwrap could drive")
+            also = ", and no actuator on a spatial tendon" if mode == reg.TRANSMISSION else ""
+            raise ModelError(f"the model declares no muscle that mjwrap could drive{also}")
         actuators = {element.id: element for element in spec.actuators}
         for muscle in muscles:
-            if muscle.actuator >= 0:
+            if muscle.actuator >= 0 and not isinstance(muscle.parameters, ActuatorForce):
                 _silence(model, muscle.actuator, actuators[muscle.actuator])
-    plan, _ = reg.read_plan(model, [muscle.name for muscle in muscles])
-    _add_instance(spec, reg.configuration([muscle.name for muscle in muscles], state_size(plan)))
+    names = [muscle.name for muscle in muscles]
+    plan, muscles = reg.read_plan(model, names, mode)
+    check_room(model, plan, muscles)
+    _add_instance(spec, reg.configuration(names, state_size(plan), mode))
     model = _compile(spec)
     if not keep_tendons:
         drop_placeholders(model, declared)
@@ -70,9 +86,8 @@ def load(path: str | os.PathLike[str], mode: str = "wrench", *, keep_tendons: bo
     return model
 
 
-def _claimed(element: mujoco.MjsPlugin) -> list[str]:
-    config = dict(element.config)
-    return reg.read_claim(element.name, config.get(reg.MUSCLES, ""), config.get(reg.NUMBERS, "")).muscles
+def _claim(element: mujoco.MjsPlugin) -> reg.Claim:
+    return reg.read_claim(element.name, dict(element.config))
 
 
 def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -92,6 +107,16 @@ def _silence(model: mujoco.MjModel, actuator: int, element: mujoco.MjsActuator) 
         low, high = -mujoco.mjMAXVAL, mujoco.mjMAXVAL
     element.gainprm[-1], element.biasprm[-1] = low, high
     element.forcelimited, element.forcerange = 1, reg.HUSHED
+
+
+def _wake(element: mujoco.MjsActuator | None) -> None:
+    """Give an actuator that `_silence` has clamped the limits back that it had."""
+    if element is None or not np.array_equal(element.forcerange, reg.HUSHED):
+        return
+    low, high = float(element.gainprm[-1]), float(element.biasprm[-1])
+    limited = high < mujoco.mjMAXVAL
+    element.gainprm[-1] = element.biasprm[-1] = 0.0
+    element.forcelimited, element.forcerange = limited, (low, high) if limited else (0.0, 0.0)
 
 
 def _add_instance(spec: mujoco.MjSpec, config: dict[str, str]) -> None:

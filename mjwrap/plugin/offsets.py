@@ -24,11 +24,12 @@ _SIZES = {
 }  # fmt: skip
 
 # pointers that the plugin follows, each verified; data_plugin_state and data_plugin_data: see `verify_plugin_fields`
-MODEL_POINTERS = ("plugin_stateadr",)
+MODEL_POINTERS = ("actuator_gear",)
+MODEL_PLUGIN_POINTERS = ("plugin_stateadr",)
 DATA_POINTERS = (
     "qpos", "qvel", "act", "ctrl", "xfrc_applied", "xipos", "geom_xpos", "geom_xmat", "site_xpos", "subtree_com",
     "cdof", "cvel", "act_dot", "actuator_length", "actuator_velocity", "moment_rownnz", "moment_rowadr",
-    "moment_colind", "actuator_moment",
+    "moment_colind", "actuator_moment", "ten_length", "ten_velocity", "ten_J", "sensordata",
 )  # fmt: skip
 PLUGIN_POINTERS = ("plugin_state", "plugin_data")
 OPTIONS = ("timestep", "integrator", "disableflags", "disableactuator")
@@ -119,6 +120,12 @@ def _probes() -> Iterator[tuple[mujoco.MjModel, mujoco.MjData]]:
             actuator = spec.add_actuator(name=f"a{i}", target=f"j{i}")
             actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
             actuator.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
+            tendon = spec.add_tendon(name=f"t{i}")
+            for k in (0, 1):
+                tendon.wrap_site(f"s{i * k}_{k}")
+            spec.add_sensor(
+                type=mujoco.mjtSensor.mjSENS_TENDONPOS, objtype=mujoco.mjtObj.mjOBJ_TENDON, objname=f"t{i}"
+            )
         model = spec.compile()
         model.opt.timestep = 0.001 * (n + 0.25)
         model.opt.integrator = n % 4
@@ -152,7 +159,7 @@ def offsets() -> Offsets:
         data, model, option = (_walk(declared[s].fields)[0] for s in ("mjData", "mjModel", "mjOption"))
         found = Offsets(
             {name: data[name] for name in ("time", "nplugin", *DATA_POINTERS, *PLUGIN_POINTERS)},
-            {name: model[name] for name in MODEL_POINTERS}
+            {name: model[name] for name in (*MODEL_POINTERS, *MODEL_PLUGIN_POINTERS)}
             | {f"opt.{name}": model["opt"] + option[name] for name in OPTIONS},
         )
     except KeyError as error:
@@ -160,6 +167,8 @@ def offsets() -> Offsets:
     for living, state in _probes():
         for field in DATA_POINTERS:
             _check_pointer(state, field, found.data[field])
+        for field in MODEL_POINTERS:
+            _check_pointer(living, field, found.model[field])
         _check_value(state, "time", ctypes.c_double, found.data["time"], state.time)
         for name in OPTIONS:
             kind = ctypes.c_double if name == "timestep" else ctypes.c_int
@@ -186,7 +195,7 @@ def model_buffer() -> ModelBuffer:
 def verify_plugin_fields(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Verify the fields that only a model with plugins has: model needs two instances with states of their own."""
     found = offsets()
-    for field in MODEL_POINTERS:
+    for field in MODEL_PLUGIN_POINTERS:
         _check_pointer(model, field, found.model[field])
     for field in PLUGIN_POINTERS:
         _check_pointer(data, field, found.data[field])

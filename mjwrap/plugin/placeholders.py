@@ -6,43 +6,106 @@ A tendon whose number of stops (`tendon_num`) is 0 has no length, no Jacobian an
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
 from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.muscles import ActuatorForce
 
 _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_ACTUATOR)
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
 _SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
-# fields of a tendon, each zero where it does nothing but pass a muscle's force on
-_ACTIVE = (
-    "tendon_limited", "tendon_actfrclimited", "tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping",
-    "tendon_dampingpoly", "tendon_armature", "tendon_frictionloss",
+_POSITION = int(mujoco.mjtStage.mjSTAGE_POS)
+# fields of a tendon and of an actuator, each zero where it does nothing but pass the actuator's force on
+_TENDON_ACTS = (
+    "tendon_limited", "tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly",
+    "tendon_armature", "tendon_frictionloss",
 )  # fmt: skip
+_ACTUATOR_ACTS = ("actuator_armature", "actuator_damping", "actuator_dampingpoly")
 
 
-def _is_idle(model: mujoco.MjModel, tendon: int, pulled_by: int) -> bool:
-    """Return whether nobody but one silenced actuator uses a tendon, and nothing measures either."""
-    if any(np.any(getattr(model, name)[tendon]) for name in _ACTIVE if hasattr(model, name)):
-        return False
-    for kind, item in ((_TENDON, tendon), (_ACTUATOR, pulled_by)):
-        if np.any((model.sensor_objtype == kind) & (model.sensor_objid == item)):
-            return False
-        if np.any((model.sensor_reftype == kind) & (model.sensor_refid == item)):
-            return False
+def _acts(model: mujoco.MjModel, fields: tuple[str, ...], item: int) -> bool:
+    return any(np.any(getattr(model, name)[item]) for name in fields if hasattr(model, name))
+
+
+def _pulling(model: mujoco.MjModel, tendon: int) -> list[int]:
+    """Return the actuators that pull a tendon."""
+    return np.flatnonzero(
+        (model.actuator_trntype == _PULLS) & (model.actuator_trnid[:, 0] == tendon)
+    ).tolist()
+
+
+def _is_used(model: mujoco.MjModel, tendon: int) -> bool:
+    """Return whether MuJoCo makes forces of a tendon: by limit, spring, damper, friction, inertia or equality."""
     ties = model.eq_type == int(mujoco.mjtEq.mjEQ_TENDON)
-    if np.any(ties & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))):
+    return (
+        _acts(model, _TENDON_ACTS, tendon)
+        or any(_acts(model, _ACTUATOR_ACTS, actuator) for actuator in _pulling(model, tendon))
+        or bool(np.any(ties & ((model.eq_obj1id == tendon) | (model.eq_obj2id == tendon))))
+    )
+
+
+def shown_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> set[int]:
+    """Return the tendons that can show mjwrap's path: all that pulls them does so along the same one, and no more."""
+    paths: dict[int, set[Any]] = {}
+    for muscle in muscles:
+        if isinstance(muscle.parameters, ActuatorForce):
+            paths.setdefault(int(model.actuator_trnid[muscle.actuator, 0]), set()).add(muscle.routes)
+    own = {muscle.actuator for muscle in muscles if isinstance(muscle.parameters, ActuatorForce)}
+    return {
+        tendon
+        for tendon, routes in paths.items()
+        if len(routes) == 1 and set(_pulling(model, tendon)) <= own and not _is_used(model, tendon)
+    }
+
+
+def is_measured_late(model: mujoco.MjModel, sensor: int) -> bool:
+    """Return whether a sensor shows what it measured before, or at intervals, rather than what it measures."""
+    late = model.sensor_delay[sensor], model.sensor_interval[sensor], model.sensor_history[sensor]
+    return any(bool(np.any(value)) for value in late)
+
+
+def _is_measured(model: mujoco.MjModel, kind: int, item: int, transmitted: bool) -> bool:
+    """Return whether a sensor needs a tendon's, or an actuator's, length along MuJoCo's own path.
+
+    transmitted: it shows mjwrap's, but for lengths that MuJoCo takes down before mjwrap has computed them.
+    """
+    measured = (model.sensor_objtype == kind) & (model.sensor_objid == item)
+    measured |= (model.sensor_reftype == kind) & (model.sensor_refid == item)
+    return any(
+        not transmitted or (int(model.sensor_needstage[i]) == _POSITION and is_measured_late(model, int(i)))
+        for i in np.flatnonzero(measured)
+    )
+
+
+def _is_idle(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown: set[int]) -> bool:
+    """Return whether all that pulls a tendon is taken over, and nobody needs its path besides.
+
+    taken: by actuator, whether it pulls along mjwrap's path, or no more. shown: tendons that show mjwrap's path.
+    """
+    if _is_used(model, tendon) or int(model.wrap_type[model.tendon_adr[tendon]]) != _SITE:
         return False
-    pulls = np.flatnonzero((model.actuator_trntype == _PULLS) & (model.actuator_trnid[:, 0] == tendon))
-    return pulls.tolist() == [pulled_by] and int(model.wrap_type[model.tendon_adr[tendon]]) == _SITE
+    pulling = _pulling(model, tendon)
+    if not pulling or not set(pulling) <= set(taken):
+        return False
+    if model.tendon_actfrclimited[tendon] and not all(taken[actuator] for actuator in pulling):
+        return False
+    return not (
+        _is_measured(model, _TENDON, tendon, tendon in shown)
+        or any(_is_measured(model, _ACTUATOR, actuator, taken[actuator]) for actuator in pulling)
+    )
 
 
 def drop_placeholders(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> None:
     """Take the stops from the tendons of these muscles that nothing else needs."""
-    for muscle in muscles:
-        if muscle.tendon >= 0 and muscle.actuator >= 0 and _is_idle(model, muscle.tendon, muscle.actuator):
-            model.wrap_prm[model.tendon_adr[muscle.tendon]] = model.tendon_num[muscle.tendon]
-            model.tendon_num[muscle.tendon] = 0
+    taken = {m.actuator: isinstance(m.parameters, ActuatorForce) for m in muscles if m.actuator >= 0}
+    shown = shown_tendons(model, muscles)
+    for tendon in {muscle.tendon for muscle in muscles if muscle.tendon >= 0}:
+        if model.tendon_num[tendon] > 0 and _is_idle(model, tendon, taken, shown):
+            model.wrap_prm[model.tendon_adr[tendon]] = model.tendon_num[tendon]
+            model.tendon_num[tendon] = 0
 
 
 def restore_placeholders(model: mujoco.MjModel) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import StateError
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import transmission as tr
 from mjwrap.plugin.callbacks.stage import PER_MUSCLE
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ class Readout:
     failures: NDArray[
         np.int64
     ]  # steps since the last reset without a path, at which the last good force was held
+    transmitted: NDArray[np.bool_]  # pulled by MuJoCo's own actuator, whose force this tension is
 
 
 def _instances(model: mujoco.MjModel) -> list[int]:
@@ -46,16 +48,31 @@ def _instances(model: mujoco.MjModel) -> list[int]:
 def read(data: mujoco.MjData) -> Readout:
     """Return what the plugin computed last for `data`: in `mj_forward`, or in `mj_step` at the state it began with."""
     names: list[str] = []
-    columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
+    columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
     for instance in _instances(data.model):
         names += reg.claim_of(data.model._address, instance).muscles
         block = int(np.asarray(data.plugin_data)[instance])
         head = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
-        for name, parts in columns.items():
+        for name in _COLUMNS:
             kind = ctypes.c_int64 if name in ("status", "failures") else ctypes.c_double
             start = block + int(head[bk.A_ROUTES + bk.ARRAYS.index(name)])
-            parts.append(np.ctypeslib.as_array((kind * int(head[bk.MUSCLES])).from_address(start)).copy())
+            columns[name].append(
+                np.ctypeslib.as_array((kind * int(head[bk.MUSCLES])).from_address(start)).copy()
+            )
+        output = _outputs(block + int(head[bk.A_TRANSMISSION]), int(head[bk.MUSCLES]))
+        own, transmitted = columns["tension"][-1], output >= 0
+        rows = output[transmitted]
+        own[transmitted] = -data.model.actuator_gear[rows, 0] * data.actuator_force[rows]
+        columns["transmitted"].append(transmitted)
     return Readout(names, *(np.concatenate(parts) for parts in columns.values()))
+
+
+def _outputs(part: int, n: int) -> NDArray[np.int64]:
+    """Return the outputs (n,) of actuators that pull their muscles, -1 elsewhere, from a part of a block."""
+    head = np.ctypeslib.as_array((ctypes.c_int64 * tr.HEAD).from_address(part))
+    if not head[tr.COUNT]:
+        return np.full(n, -1, dtype=np.int64)
+    return np.ctypeslib.as_array((ctypes.c_int64 * n).from_address(part + int(head[tr.A_OUTPUT])))
 
 
 def excitations(data: mujoco.MjData) -> dict[str, Array]:

@@ -14,6 +14,7 @@ import os
 import sys
 import threading
 from collections import OrderedDict
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 from urllib.parse import quote, unquote
 
@@ -32,7 +33,8 @@ from mjwrap.plugin.placeholders import restore_placeholders
 from mjwrap.takeover import Takeover
 
 NAME = "mjwrap.muscles"
-MUSCLES, NUMBERS = "muscles", "numbers"  # its configuration
+MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"  # its configuration
+WRENCH, TRANSMISSION = "wrench", "transmission"  # modes
 _PROBE = "mjwrap.probe"
 _PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC
 _KEPT_IMAGES = 16
@@ -51,33 +53,38 @@ _here = threading.local()  # .reading: init is reading a copy of the model; .err
 
 
 class Claim(NamedTuple):
-    """What an instance is to drive: names of its muscles, and the numbers of plugin_state that it has."""
+    """What an instance is to drive: names of its muscles, the numbers of plugin_state that it has, and the mode."""
 
     muscles: list[str]
     numbers: int
+    mode: str
 
 
-def configuration(muscles: list[str], numbers: int) -> dict[str, str]:
+def configuration(muscles: list[str], numbers: int, mode: str) -> dict[str, str]:
     """Return the configuration of an instance; names are quoted as in URLs, so that spaces part them."""
-    return {MUSCLES: " ".join(quote(name, safe="/") for name in muscles), NUMBERS: str(numbers)}
+    names = " ".join(quote(name, safe="/") for name in muscles)
+    return {MUSCLES: names, NUMBERS: str(numbers), MODE: mode}
 
 
-def read_claim(name: str, muscles: str, numbers: str) -> Claim:
+def read_claim(name: str, config: Mapping[str, str]) -> Claim:
     """Return the claim of an instance from its name and configuration."""
     prefix = name.removesuffix(INSTANCE)
-    if not name.endswith(INSTANCE) or not numbers.isdigit():
+    muscles, numbers, mode = (config.get(key, "") for key in (MUSCLES, NUMBERS, MODE))
+    if not name.endswith(INSTANCE) or not numbers.isdigit() or mode not in (WRENCH, TRANSMISSION):
         raise ModelError(
             f"plugin instance '{name}' was not made by mjwrap.install; leave it out and call install on the MjSpec"
         )
-    return Claim([prefix + unquote(part) for part in muscles.split()], int(numbers))
+    return Claim([prefix + unquote(part) for part in muscles.split()], int(numbers), mode)
 
 
 def claim_of(model: int, instance: int) -> Claim:
     """Return the claim of an instance of the model at an address."""
     lib = library()
     name = lib.mj_id2name(model, int(mujoco.mjtObj.mjOBJ_PLUGIN), instance) or b""
-    texts = [lib.mj_getPluginConfig(model, instance, key.encode()) or b"" for key in (MUSCLES, NUMBERS)]
-    return read_claim(name.decode(), *(text.decode() for text in texts))
+    texts = {
+        key: lib.mj_getPluginConfig(model, instance, key.encode()) or b"" for key in (MUSCLES, NUMBERS, MODE)
+    }
+    return read_claim(name.decode(), {key: text.decode() for key, text in texts.items()})
 
 
 def hush_to_silence(model: mujoco.MjModel) -> None:
@@ -86,12 +93,13 @@ def hush_to_silence(model: mujoco.MjModel) -> None:
     model.actuator_forcerange[hushed] = 0.0
 
 
-def read_plan(model: mujoco.MjModel, names: list[str]) -> tuple[Plan, list[MuscleDeclaration]]:
+def read_plan(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Plan, list[MuscleDeclaration]]:
     """Return the named muscles of a model and their arrays; `ModelError` where one is missing."""
     hush_to_silence(model)
     restore_placeholders(model)
     with Takeover(model).suspended():
-        declared = {muscle.name: muscle for muscle in read_declarations(model).muscles}
+        found = read_declarations(model, transmission=mode == TRANSMISSION).muscles
+    declared = {muscle.name: muscle for muscle in found}
     missing = [name for name in names if name not in declared]
     if missing:
         raise ModelError(
@@ -114,7 +122,7 @@ def _image(address: int, instance: int) -> bytes:
     try:
         model = mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": saved.raw})
         claim = claim_of(address, instance)
-        plan, muscles = read_plan(model, claim.muscles)
+        plan, muscles = read_plan(model, claim.muscles, claim.mode)
     finally:
         _here.reading = False
     if state_size(plan) != claim.numbers:
@@ -240,4 +248,4 @@ def register() -> None:
     _entries()
     hooks = compile_hooks(offsets().data)
     python = {"nstate": _NSTATE(_nstate), "init": _INIT(_init)}
-    _register(NAME, python | hooks._asdict(), (MUSCLES, NUMBERS))
+    _register(NAME, python | hooks._asdict(), (MUSCLES, NUMBERS, MODE))

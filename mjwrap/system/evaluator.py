@@ -12,7 +12,7 @@ from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels import evaluation, readiness
 from mjwrap.mjcf import has_plugin, read_declarations
 from mjwrap.paths import Status
-from mjwrap.plan import build_plan
+from mjwrap.plan import build_plan, last_dofs
 from mjwrap.system.checks import check_state, ends_inside
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
@@ -48,6 +48,7 @@ class Evaluator(Results):
         self._excitation: Array = np.zeros(self._plan.n)
         self._root = np.asarray(model.body_rootid, dtype=np.int64)
         self._parent = np.asarray(model.body_parentid, dtype=np.int64)
+        self._last_dof = last_dofs(model)
         self._dofs = tuple(
             np.asarray(a, dtype=np.int64) for a in (model.body_dofadr, model.body_dofnum, model.dof_parentid)
         )

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from mjwrap.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.errors import StateError
-from mjwrap.kernels import coupling, dynamics, layout
+from mjwrap.kernels import coupling, dynamics, layout, moments
 from mjwrap.kernels.muscle import PATH_ACTUATOR
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
@@ -92,9 +92,9 @@ class MuscleSystem(Evaluator):
         self.forward(data)
         state, plan = self._last, self._plan
         jacobian = np.zeros((plan.n, self.model.nv))
-        coupling.length_jacobian(
-            plan.routes, plan.weights, plan.links, state.segments, state.count, self._dofs,
-            self._parent, self._root, state.scratch.cdof, state.scratch.subtree_com, jacobian,
+        moments.length_jacobian(
+            plan.routes, plan.weights, plan.links, state.segments, state.count, self._last_dof,
+            self._dofs[2], self._root, state.scratch.cdof, state.scratch.subtree_com, jacobian,
         )  # fmt: skip
         return jacobian
 

@@ -31,16 +31,18 @@ ARRAYS = (
     "weights", "params", "ctrl_low", "ctrl_high", "times",
     "node", "seg", "count", "info", "own", "excitation", "drive", "start_activation", "start_fiber", "start_length",
     "activation", "fiber", "length", "velocity", "tension", "next_activation", "next_fiber", "status",
-    "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost",
+    "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost", "transmission",
 )  # fmt: skip
 (
     A_ROUTES, A_LINKS, A_LAW, A_SOURCE, A_INDEX, A_CONTROL, A_FORM, A_GROUP, A_BODY_ROOTID, A_LOADED,
     A_WEIGHTS, A_PARAMS, A_CTRL_LOW, A_CTRL_HIGH, A_TIMES,
     A_NODE, A_SEG, A_COUNT, A_INFO, A_OWN, A_EXCITATION, A_DRIVE, A_START_ACTIVATION, A_START_FIBER, A_START_LENGTH,
     A_ACTIVATION, A_FIBER, A_LENGTH, A_VELOCITY, A_TENSION, A_NEXT_ACTIVATION, A_NEXT_FIBER, A_STATUS,
-    A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST,
+    A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST, A_TRANSMISSION,
 ) = range(40, 40 + len(ARRAYS))  # fmt: skip
 HEAD = 40 + len(ARRAYS)
+
+SILENT = -2  # in `group`: the muscle's own tension is zero, since its actuator pulls
 
 # entries of `clock`: time of the first evaluation since the last step where the state's own clock says nothing;
 # whether there was an evaluation since the last step

@@ -77,6 +77,12 @@ def words(address, shape):
 
 
 @jit
+def halves(address, shape):
+    """Return the 32-bit integers at an address as an array of the given shape."""
+    return carray(pointer(address), shape, np.int32)
+
+
+@jit
 def flags(address, shape):
     """Return the bytes at an address as an array of booleans of the given shape."""
     return carray(pointer(address), shape, np.bool_)

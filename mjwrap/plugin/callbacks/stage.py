@@ -19,6 +19,7 @@ from mjwrap.kernels.muscle import PARAMS
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word, words
+from mjwrap.plugin.callbacks.transmission import transmit
 
 TOLERANCE = 1e-10  # largest tangency error of a path, as in MuscleSystem
 GROUPS = 31  # actuator groups that options can switch off
@@ -182,11 +183,14 @@ def _since(time, step, ended, clock):
 
 
 def stage(block, model, data):
-    """Evaluate the instance's muscles at the poses and velocities in mjData; add their wrenches to xfrc_applied."""
+    """Evaluate the instance's muscles at the poses and velocities in mjData, and act: by wrenches or transmission."""
     state = _state(block, data)
     _retreat(block, data, state)
     clock = _floats(block, bk.A_CLOCK, (bk.CLOCK,))
-    if half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION):
+    part = block + word(block + 8 * bk.A_TRANSMISSION)
+    transmits = word(part) != 0
+    idle = half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION) != 0
+    if idle and not transmits:
         clock[bk.ACTED] = 0.0
         return
     n, nodes, routes, bodies = _sizes(block)
@@ -200,7 +204,8 @@ def stage(block, model, data):
     off, group = flags(block + word(block + 8 * bk.A_OFF), (n,)), _ints(block, bk.A_GROUP, (n,))
     switched = half(model + word(block + 8 * bk.DISABLEACTUATOR))
     for m in range(n):
-        off[m] = 0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0
+        off[m] = idle or group[m] == bk.SILENT
+        off[m] = off[m] or (0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0)
     wrench = _floats(block, bk.A_WRENCH, (bodies, 6))
     evaluate(
         _ints(block, bk.A_ROUTES, (routes, ROUTE)),
@@ -252,6 +257,23 @@ def stage(block, model, data):
     for m in range(n):
         lost[m] = status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _advance_into(block, data, state, wrench)
+    if transmits:
+        transmit(
+            part,
+            block,
+            model,
+            data,
+            since == 0.0,
+            _ints(block, bk.A_ROUTES, (routes, ROUTE)),
+            _floats(block, bk.A_WEIGHTS, (routes,)),
+            _ints(block, bk.A_LINKS, (nodes, 4)),
+            _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
+            _ints(block, bk.A_COUNT, (routes,)),
+            _ints(block, bk.A_BODY_ROOTID, (bodies,)),
+            reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
+            _floats(block, bk.A_LENGTH, (n,)),
+            _floats(block, bk.A_VELOCITY, (n,)),
+        )
     clock[bk.ACTED] = 1.0
 
 

@@ -1,0 +1,105 @@
+"""Transmission: actuators of MuJoCo's own get length, velocity and moment along mjwrap's paths.
+
+MuJoCo computes these three in its position and velocity stages, then passive forces, at which the plugin is called, and
+only then the forces of actuators: so what is written in between is what gain, bias, clamps, sensors of velocity and
+force, and the derivatives of the implicit integrators see. What it needs beside the block of the instance lies in a
+part of that block with a head of its own, which `mjwrap/plugin/transmission.py` writes.
+"""
+
+from __future__ import annotations
+
+from mjwrap.kernels.moments import write_transmissions
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.memory import half, halves, reals, word, words
+
+# sizes; COUNT: of muscles whose actuators pull, 0 where all act by wrenches and nothing else is filled
+COUNT, DOFS, OUTPUTS, MOMENTS, TENDONS, TENDON_MOMENTS, SENSORS, SENSOR_NUMBERS = range(8)
+NO_SENSORS = 8  # the bit of `disableflags` that switches sensors off
+# byte offsets of mjData's fields, then of mjModel's
+FIELDS = (
+    "cdof", "actuator_length", "actuator_velocity", "moment_rownnz", "moment_rowadr", "moment_colind",
+    "actuator_moment", "ten_length", "ten_velocity", "ten_J", "sensordata", "actuator_gear",
+)  # fmt: skip
+(
+    CDOF, LENGTH, VELOCITY, ROWNNZ, ROWADR, COLIND, MOMENT, TEN_LENGTH, TEN_VELOCITY, TEN_J, SENSORDATA, GEAR,
+) = range(9, 9 + len(FIELDS))  # fmt: skip
+# where the arrays start: `write_transmissions` says what the first six are; sensors of the position stage, their
+# numbers' index, muscle and whether it is an actuator's (k, 3), and their least and largest value (k, 2)
+ARRAYS = ("output", "tendon", "tendon_row", "last_dof", "dof_parentid", "row", "sensor", "limits")
+A_OUTPUT, A_TENDON, A_TENDON_ROW, A_LAST_DOF, A_PARENT, A_ROW, A_SENSOR, A_LIMITS = range(
+    24, 24 + len(ARRAYS)
+)
+HEAD = 24 + len(ARRAYS)
+
+
+@jit
+def _ints(part, which, shape):
+    return words(part + word(part + 8 * which), shape)
+
+
+@jit
+def _floats(part, which, shape):
+    return reals(part + word(part + 8 * which), shape)
+
+
+@jit
+def _field(part, which, owner, shape):
+    """Return the array of doubles to which a field of mjData, or mjModel, points."""
+    return reals(word(owner + word(part + 8 * which)), shape)
+
+
+@jit
+def _indices(part, which, owner, shape):
+    return halves(word(owner + word(part + 8 * which)), shape)
+
+
+@jit
+def transmit(
+    part, block, model, data, first_stage, routes, weights, links, seg, count, root, com, length, velocity
+):
+    """Write what the actuators of an instance's muscles see; first_stage: sensors, too, show the present state."""
+    n, dofs, outputs = length.shape[0], word(part + 8 * DOFS), word(part + 8 * OUTPUTS)
+    entries, tendons = word(part + 8 * MOMENTS), word(part + 8 * TENDONS)
+    gear = _field(part, GEAR, model, (outputs, 6))
+    write_transmissions(
+        _ints(part, A_OUTPUT, (n,)),
+        _ints(part, A_TENDON, (n,)),
+        _ints(part, A_TENDON_ROW, (n,)),
+        routes,
+        weights,
+        links,
+        seg,
+        count,
+        length,
+        velocity,
+        _ints(part, A_LAST_DOF, (root.shape[0],)),
+        _ints(part, A_PARENT, (dofs,)),
+        root,
+        _field(part, CDOF, data, (dofs, 6)),
+        com,
+        _floats(part, A_ROW, (dofs,)),
+        gear,
+        _field(part, LENGTH, data, (outputs,)),
+        _field(part, VELOCITY, data, (outputs,)),
+        _indices(part, ROWNNZ, data, (outputs,)),
+        _indices(part, ROWADR, data, (outputs,)),
+        _indices(part, COLIND, data, (entries,)),
+        _field(part, MOMENT, data, (entries,)),
+        _field(part, TEN_LENGTH, data, (tendons,)),
+        _field(part, TEN_VELOCITY, data, (tendons,)),
+        _field(part, TEN_J, data, (word(part + 8 * TENDON_MOMENTS),)),
+    )
+    flags = half(model + word(block + 8 * bk.DISABLEFLAGS))
+    if not first_stage or flags & word(part + 8 * NO_SENSORS):
+        return
+    sensors = word(part + 8 * SENSORS)
+    sensor, limits = _ints(part, A_SENSOR, (sensors, 3)), _floats(part, A_LIMITS, (sensors, 2))
+    shown = _field(part, SENSORDATA, data, (word(part + 8 * SENSOR_NUMBERS),))
+    sizes, output = _field(part, LENGTH, data, (outputs,)), _ints(part, A_OUTPUT, (n,))
+    for k in range(sensors):
+        m = sensor[k, 1]
+        value = sizes[output[m]]
+        if sensor[k, 2] == 0:
+            value = _field(part, TEN_LENGTH, data, (tendons,))[_ints(part, A_TENDON, (n,))[m]]
+        shown[sensor[k, 0]] = min(max(value, limits[k, 0]), limits[k, 1])
