@@ -16,12 +16,17 @@ EXPLICIT = [INTEGRATORS["mjINT_EULER"], INTEGRATORS["mjINT_RK4"]]
 PUSH = np.array([0.3, -1.5, 2.5, 0.05, -0.02, 0.04])  # somebody else's force [N] and torque [N m]
 
 
-def native_model(path: Path = ELBOW) -> mujoco.MjModel:
+def native_spec(path: Path = ELBOW) -> mujoco.MjSpec:
     """The model without its mjwrap tuples: its muscle actuators are MuJoCo's, and declarations as they stand."""
     spec = mujoco.MjSpec.from_file(str(path))
     for element in list(spec.tuples):
         spec.delete(element)
-    return spec.compile()
+    return spec
+
+
+def native_model(path: Path = ELBOW) -> mujoco.MjModel:
+    """The compiled `native_spec`."""
+    return native_spec(path).compile()
 
 
 def start(model: mujoco.MjModel) -> mujoco.MjData:

@@ -14,7 +14,7 @@ import pytest
 import test_path_failures
 from declared_models import ARM, EXTENSOR, HILL, HOLDER, MUSCLE, ROW, declared, element
 from mujoco import batch, rollout
-from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, start
+from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, native_spec, start
 
 import mjwrap as mw
 from mjwrap.plugin import excitations, install, load, read
@@ -98,7 +98,7 @@ def test_mj_step_moves_as_muscle_system_does(scene: str, integrator: int) -> Non
 def test_mj_step_moves_as_the_native_twin_does(integrator: int) -> None:
     """Cylinders and MuJoCo's own muscle law: what MuJoCo computes exactly itself."""
     native = native_model()
-    ours = install(_without_tuples(ELBOW))
+    ours = install(native_spec())
     for model in (native, ours):
         model.opt.integrator = int(integrator)
     data, twin = start(ours), start(native)
@@ -109,13 +109,6 @@ def test_mj_step_moves_as_the_native_twin_does(integrator: int) -> None:
         mujoco.mj_step(native, twin)
     np.testing.assert_allclose(data.qpos, twin.qpos, rtol=0.0, atol=1e-12)  # rounding over 500 steps
     np.testing.assert_allclose(data.qvel, twin.qvel, rtol=0.0, atol=1e-11)
-
-
-def _without_tuples(path: Path) -> mujoco.MjSpec:
-    spec = mujoco.MjSpec.from_file(str(path))
-    for declaration in list(spec.tuples):
-        spec.delete(declaration)
-    return spec
 
 
 def test_runge_kutta_keeps_its_fourth_order() -> None:
@@ -139,8 +132,11 @@ def test_runge_kutta_keeps_its_fourth_order() -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_bits_do_not_depend_on_who_steps(scene: str) -> None:
+    check_bits(install(spec_of(SCENES[scene])))
+
+
+def check_bits(model: mujoco.MjModel) -> None:
     """A loop, rollout and batch on one and two threads, environments in any order: all states are the same."""
-    model = install(spec_of(SCENES[scene]))
     nenv, nstep = 6, 120
     initial = np.stack([state_of(moving(model, seed)) for seed in range(nenv)])
     control = np.random.default_rng(1).uniform(0.0, 1.0, (nenv, nstep, model.nu))
@@ -291,7 +287,7 @@ def test_what_cannot_be_installed_is_named() -> None:
         install(
             mujoco.MjSpec.from_string("<mujoco><worldbody><body><geom size='1'/></body></worldbody></mujoco>")
         )
-    with pytest.raises(mw.ModelError, match="modes: wrench"):
+    with pytest.raises(mw.ModelError, match="modes: wrench, transmission"):
         install(spec_of(SCENES["arm"]), mode="push")
     with pytest.raises(mw.ModelError, match="expected an MjSpec"):
         install(native_model())  # type: ignore[arg-type]

@@ -62,7 +62,7 @@ def read(data: mujoco.MjData) -> Readout:
         output = _outputs(block + int(head[bk.A_TRANSMISSION]), int(head[bk.MUSCLES]))
         own, transmitted = columns["tension"][-1], output >= 0
         rows = output[transmitted]
-        own[transmitted] = -data.model.actuator_gear[rows, 0] * data.actuator_force[rows]
+        own[transmitted] = 0.0 - data.model.actuator_gear[rows, 0] * data.actuator_force[rows]
         columns["transmitted"].append(transmitted)
     return Readout(names, *(np.concatenate(parts) for parts in columns.values()))
 
