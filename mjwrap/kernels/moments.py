@@ -95,22 +95,25 @@ def write_transmissions(
                 r, weights[r], routes, links, seg, seg_count, last_dof, dof_parentid, body_rootid, cdof,
                 subtree_com, row,
             )  # fmt: skip
-        total = length[m] + velocity[m]
-        for k in range(rowadr[out], rowadr[out] + rownnz[out]):
-            total += row[colind[k]]
-        sound = math.isfinite(total)
+        factor, shown, start, place = gear[out, 0], tendon[m], rowadr[out], tendon_row[m]
+        sound = math.isfinite(length[m]) and math.isfinite(velocity[m])
+        for k in range(rownnz[out]):
+            dof = colind[start + k]
+            value = row[dof]
+            row[dof] = 0.0
+            if not math.isfinite(value):
+                sound = False
+            moment[start + k] = factor * value
+            if shown >= 0:
+                ten_j[place + k] = value
         size, speed = (length[m], velocity[m]) if sound else (0.0, 0.0)
-        actuator_length[out] = gear[out, 0] * size
-        actuator_velocity[out] = gear[out, 0] * speed
-        shown = tendon[m]
+        actuator_length[out] = factor * size
+        actuator_velocity[out] = factor * speed
         if shown >= 0:
             ten_length[shown] = size
             ten_velocity[shown] = speed
-        start, place = rowadr[out], tendon_row[m]
-        for k in range(rownnz[out]):
-            dof = colind[start + k]
-            value = row[dof] if sound else 0.0
-            moment[start + k] = gear[out, 0] * value
-            if shown >= 0:
-                ten_j[place + k] = value
-            row[dof] = 0.0
+        if not sound:
+            for k in range(rownnz[out]):
+                moment[start + k] = 0.0
+                if shown >= 0:
+                    ten_j[place + k] = 0.0
