@@ -340,6 +340,7 @@ def test_tendons_that_only_show_the_way_are_left_out(tmp_path: Path) -> None:
         ("</mujoco>", '<sensor><actuatorvel actuator="extensor"/></sensor></mujoco>'),
         ("</mujoco>", '<equality><tendon tendon1="extensor"/></equality></mujoco>'),
         ("</actuator>", '<motor tendon="extensor"/></actuator>'),
+        ("<muscle ", '<muscle damping="1" '),
     ],
 )
 def test_tendons_that_somebody_needs_stay(before: str, after: str) -> None:

@@ -304,6 +304,26 @@ def test_tendons_show_the_path_unless_mujoco_itself_uses_them() -> None:
     assert len(set(lengths)) == 1
 
 
+def test_sensors_of_force_keep_the_tendons() -> None:
+    """MuJoCo lets them feel its actuators along its own tendons, which are right here."""
+    datas = []
+    for mode in (None, "wrench", "transmission"):
+        spec = native_spec()
+        spec.body("forearm").add_site(name="joint")
+        for kind in (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE):
+            spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="joint")
+        data = start(spec.compile() if mode is None else install(spec, mode=mode))
+        data.ctrl[:] = 0.5
+        mujoco.mj_step(data.model, data, nstep=20)
+        datas.append(data)
+    native, wrench, transmission = datas
+    assert not wrench.model.tendon_num.any()
+    assert transmission.model.tendon_num.all()
+    assert np.abs(native.sensordata[:3]).max() > 100.0
+    for data in (wrench, transmission):
+        np.testing.assert_allclose(data.sensordata, native.sensordata, rtol=0.0, atol=1e-8)
+
+
 def test_actuation_switched_off_leaves_lengths_to_be_read() -> None:
     data, twin = twins("elbow")
     for each in (data, twin):

@@ -18,6 +18,7 @@ _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_AC
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
 _SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
 _POSITION = int(mujoco.mjtStage.mjSTAGE_POS)
+_FORCES = (int(mujoco.mjtSensor.mjSENS_FORCE), int(mujoco.mjtSensor.mjSENS_TORQUE))
 # fields of a tendon and of an actuator, each zero where it does nothing but pass the actuator's force on
 _TENDON_ACTS = (
     "tendon_limited", "tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly",
@@ -92,6 +93,8 @@ def _is_idle(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown: 
         return False
     if model.tendon_actfrclimited[tendon] and not all(taken[actuator] for actuator in pulling):
         return False
+    if np.isin(model.sensor_type, _FORCES).any() and any(taken[actuator] for actuator in pulling):
+        return False  # MuJoCo lets them feel its actuators where its own tendons pull
     return not (
         _is_measured(model, _TENDON, tendon, tendon in shown)
         or any(_is_measured(model, _ACTUATOR, actuator, taken[actuator]) for actuator in pulling)
