@@ -324,6 +324,17 @@ def test_sensors_of_force_keep_the_tendons() -> None:
         np.testing.assert_allclose(data.sensordata, native.sensordata, rtol=0.0, atol=1e-8)
 
 
+def test_muscles_without_a_force_keep_their_strength() -> None:
+    """MuJoCo derives it from acc0, which mj_setConst computes along its own path: the tendon has to be there."""
+    model = install(
+        spec_of(ARM.format(tendon=EXTENSOR, actuator=MUSCLE.replace("400", "-1"), custom="", option="")),
+        mode="transmission",
+    )
+    before = float(model.actuator_acc0[0])
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    assert model.actuator_acc0[0] == before > 0.0
+
+
 def test_actuation_switched_off_leaves_lengths_to_be_read() -> None:
     data, twin = twins("elbow")
     for each in (data, twin):

@@ -68,6 +68,12 @@ def is_measured_late(model: mujoco.MjModel, sensor: int) -> bool:
     return any(bool(np.any(value)) for value in late)
 
 
+def _is_scaled(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether a muscle's strength is derived from acc0, which `mj_setConst` computes along MuJoCo's own path."""
+    muscle = int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_MUSCLE)
+    return muscle and bool(model.actuator_gainprm[actuator, 2] < 0.0)
+
+
 def _is_measured(model: mujoco.MjModel, kind: int, item: int, transmitted: bool) -> bool:
     """Return whether a sensor needs a tendon's, or an actuator's, length along MuJoCo's own path.
 
@@ -95,6 +101,8 @@ def _is_idle(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown: 
         return False
     if np.isin(model.sensor_type, _FORCES).any() and any(taken[actuator] for actuator in pulling):
         return False  # MuJoCo lets them feel its actuators where its own tendons pull
+    if any(taken[actuator] and _is_scaled(model, actuator) for actuator in pulling):
+        return False
     return not (
         _is_measured(model, _TENDON, tendon, tendon in shown)
         or any(_is_measured(model, _ACTUATOR, actuator, taken[actuator]) for actuator in pulling)
