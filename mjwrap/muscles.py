@@ -166,7 +166,8 @@ class MuJoCoMuscle:
     """MuJoCo's own `<muscle>` curves, so that a native model can be compared like for like.
 
     prm (9,): range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`; length_range (2,)
-    of the actuator [m times gear]; acc0; gear; force_range (2,) [N]. `ModelError` where the curves are undefined.
+    of the actuator [m times gear]; acc0; gear; force_range (2,) [N]; passive (9,): those of the passive force, as in
+    `actuator_biasprm`, where it has its own. `ModelError` where the curves are undefined.
     """
 
     prm: tuple[float, ...]
@@ -174,21 +175,24 @@ class MuJoCoMuscle:
     acc0: float
     gear: float = 1.0
     force_range: tuple[float, float] = (-math.inf, math.inf)
+    passive: tuple[float, ...] | None = None
     code: ClassVar[int] = muscle.MUJOCO
     law: ClassVar[str] = "mujoco"
 
     def __post_init__(self) -> None:
-        _require(self, len(self.prm) == 9, "prm", len(self.prm), "nine numbers")
-        for name, value in zip(_PRM, self.prm, strict=True):
-            _require(self, math.isfinite(value), name, value, "finite")
+        for what, prm in (("", self.prm), ("passive ", self.passive or self.prm)):
+            _require(self, len(prm) == 9, f"{what}prm", len(prm), "nine numbers")
+            for name, value in zip(_PRM, prm, strict=True):
+                _require(self, math.isfinite(value), what + name, value, "finite")
+            _require(self, prm[1] > prm[0], f"{what}range", prm[1], f"above {prm[0]}")
+            _require(self, prm[5] > 0.0, f"{what}lmax", prm[5], "finite and positive")
         _require(self, math.isfinite(self.acc0), "acc0", self.acc0, "finite")
         _require(self, math.isfinite(self.gear) and self.gear > 0.0, "gear", self.gear, "finite and positive")
         low, high = self.length_range
         _require(
             self, high > low, "length range", low - high, "increasing: optimal fibre length is zero otherwise"
         )
-        _require(self, self.prm[1] > self.prm[0], "range", self.prm[1], f"above {self.prm[0]}")
-        _positive(self, vmax=self.prm[6], lmax=self.prm[5])
+        _positive(self, vmax=self.prm[6])
         least, most = self.force_range
         _require(self, least <= most, "force range", least, f"at most {most}")
 
@@ -199,7 +203,9 @@ class MuJoCoMuscle:
 
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of `mjwrap/kernels/mujoco_muscle.py`."""
-        return (*self.prm, *self.length_range, self.acc0, self.gear, *self.force_range)
+        range0, range1, force, scale, _, lmax, _, fpmax, _ = self.passive or self.prm
+        passive = (range0, range1, force, scale, lmax, fpmax)
+        return (*self.prm, *self.length_range, self.acc0, self.gear, *self.force_range, *passive)
 
 
 @dataclass(frozen=True)

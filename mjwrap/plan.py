@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import coupling, dynamics, layout, muscle
-from mjwrap.mjcf import MuscleDeclaration, Node, keeps_state
+from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
 from mjwrap.muscles import ActuatorForce
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Plan:
     ctrl_low: Array  # (n,)
     ctrl_high: Array  # (n,)
     form: Ints  # (n,) of the activation dynamics
-    times: Array  # (n, 3) activation and deactivation time constants [s], smoothness
+    times: Array  # (n, 5) constants of the activation dynamics
     integrates: bool  # whether mjwrap integrates a state itself
     output: (
         Ints  # (n,) of the actuator whose length, velocity and moment mjwrap writes; -1 where wrenches act
@@ -59,8 +59,21 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
     if kept:
         return dynamics.KEPT, states, control, low, high
     if single:
-        return dynamics.FROM_ACT, states, control, low, high
+        early = bool(model.actuator_actearly[actuator]) and not isinstance(declared.parameters, ActuatorForce)
+        return dynamics.EARLY if early else dynamics.FROM_ACT, states, control, low, high
     return dynamics.FROM_CTRL, 0, control, low, high
+
+
+def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int) -> tuple[int, list[float]]:
+    """Return form and constants of a muscle's activation dynamics: mjwrap's, or the actuator's that acts early."""
+    if source != dynamics.EARLY:
+        return declared.activation.form, [*declared.activation.row(), 0.0, 0.0]
+    actuator = declared.actuator
+    low, high = -np.inf, np.inf
+    if model.actuator_actlimited[actuator]:
+        low, high = (float(x) for x in model.actuator_actrange[actuator])
+    constants = [float(x) for x in model.actuator_dynprm[actuator, :3]]
+    return EARLY_DYNAMICS[int(model.actuator_dyntype[actuator])], [*constants, low, high]
 
 
 def kernel_rows(node: Node) -> list[Array]:
@@ -72,6 +85,7 @@ def kernel_rows(node: Node) -> list[Array]:
     dims = node.surface.dims
     row[layout.KIND], row[layout.SIZE] = node.surface.kind, node.surface.size
     row[layout.DIM : layout.DIM + len(dims)] = dims
+    row[layout.INSIDE] = float(node.inside)
     if not node.surface.hollow:
         return [row]
     twin = row.copy()
@@ -114,6 +128,9 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         for m in muscles
     ]
     sources = [_source(model, declared) for declared in muscles]
+    activations = [
+        _activation(model, declared, source[0]) for declared, source in zip(muscles, sources, strict=True)
+    ]
     for m, declared in enumerate(muscles):
         values = declared.parameters.row()
         params[m, : len(values)] = values
@@ -130,8 +147,8 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         control=np.array([s[2] for s in sources], dtype=np.int64),
         ctrl_low=np.array([s[3] for s in sources], dtype=np.float64),
         ctrl_high=np.array([s[4] for s in sources], dtype=np.float64),
-        form=np.array([declared.activation.form for declared in muscles], dtype=np.int64),
-        times=np.array([declared.activation.row() for declared in muscles], dtype=np.float64).reshape(-1, 3),
+        form=np.array([form for form, _ in activations], dtype=np.int64),
+        times=np.array([row for _, row in activations], dtype=np.float64).reshape(-1, dynamics.TIMES),
         output=np.array(outputs, dtype=np.int64),
         integrates=any(s[0] in (dynamics.OWN, dynamics.KEPT) for s in sources),
     )

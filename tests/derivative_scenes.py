@@ -13,7 +13,7 @@ import mjwrap as mw
 
 Array = NDArray[np.float64]
 SPACING = 0.12  # from obstacle to obstacle [m]
-SHORTEST = {"b": 5e-4, "v": -1.0}  # arcs [m], 2e-3 elsewhere
+SHORTEST = {"b": 5e-4, "v": -1.0, "C": -1.0, "S": -1.0}  # arcs [m], 2e-3 elsewhere
 REACH = 0.04  # largest distance of an obstacle's points from its centre, cylinders' ends aside [m]
 TIGHT = 1e-13  # tangency error asked for: difference quotients divide by steps of 1e-4
 
@@ -67,7 +67,7 @@ class Case:
                 row.append(mw.ViaPoint(pos))
             else:
                 quat = times(exponential(step * d[3:]), np.array(o.quat))
-                row.append(mw.Obstacle(o.surface, pos, tuple(quat), o.hint))
+                row.append(mw.Obstacle(o.surface, pos, tuple(quat), o.hint, o.inside))
         ends = self.origin + step * direction[0, :3], self.insertion + step * direction[-1, :3]
         return mw.solve_path(*ends, row, start=self.sol, tol=TIGHT)
 
@@ -99,7 +99,10 @@ def make_case(origin: Array, insertion: Array, row: list[mw.Obstacle | mw.ViaPoi
 
 
 def random_obstacle(rng: np.random.Generator, letter: str, x: float) -> mw.Obstacle | mw.ViaPoint:
-    """Return an obstacle near (x, 0, 0) at any angle: of `SURFACES`, "b" for a ring lying flat, "v" for a via point."""
+    """Return an obstacle near (x, 0, 0) at any angle: of `SURFACES`, "b" for a ring lying flat, "v" for a via point.
+
+    "C" and "S" hold the string to a cylinder and a sphere beside it.
+    """
     y, z = rng.uniform(-0.02, 0.02, 2)
     if letter == "v":
         return mw.ViaPoint((x, y, z))
@@ -110,6 +113,12 @@ def random_obstacle(rng: np.random.Generator, letter: str, x: float) -> mw.Obsta
             ring, (x, 0.2 * y, -rng.uniform(0.3, 0.7) * ring.minor_radius), tuple(quat), (0, 0, 0.02)
         )
     quat = rng.normal(size=4)
+    if letter in "CS":
+        surface = SURFACES[letter.lower()](rng)
+        beside = (x, surface.size + rng.uniform(0.015, 0.05), z)
+        if letter == "C":
+            quat = np.r_[1.0, 0.2 * rng.normal(size=3)]
+        return mw.Obstacle(surface, beside, tuple(quat), inside=True)
     if letter in "cyk":  # axes of long ones stay clear of the neighbours
         quat = np.r_[1.0, 0.2 * rng.normal(size=3)]
     return mw.Obstacle(SURFACES[letter](rng), (x, y, z), tuple(quat))

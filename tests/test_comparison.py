@@ -130,7 +130,8 @@ def test_a_route_with_pulleys_is_read_as_mujoco_walks_it() -> None:
     """Weights, contact points and end points of every span add up to ten_length."""
     model = load(ROUTE)
     data = mujoco.MjData(model)
-    assert [span.weight for span in tendon_spans(model, 0)] == [1.0, 1.0, 0.5, pytest.approx(1 / 3)]
+    mujoco.mj_forward(model, data)
+    assert [span.weight for span in tendon_spans(model, data, 0)] == [1.0, 1.0, 0.5, pytest.approx(1 / 3)]
     record = WrapRecord(model, 9)
     lengths = []
     for k, angle in enumerate(np.linspace(-0.3, 0.3, 9)):
@@ -138,11 +139,11 @@ def test_a_route_with_pulleys_is_read_as_mujoco_walks_it() -> None:
         mujoco.mj_forward(model, data)
         record.keep(k, data)
         lengths.append(float(data.ten_length[0]))
-    spans = record.spans(0)
-    assert spans[0].touched.all()
-    assert not spans[1].touched.any()
-    for span, points in zip(tendon_spans(model, 0), spans, strict=True):
-        for site, end in ((span.start, points.a), (span.end, points.b)):
+    points = record.points(0, tendon_spans(model, data, 0))
+    assert points[0].touched.all()
+    assert not points[1].touched.any()
+    for span, at in zip(tendon_spans(model, data, 0), points, strict=True):
+        for site, end in ((span.start, at.a), (span.end, at.b)):
             if model.site_bodyid[site] == 0:
                 assert np.array_equal(end, np.tile(model.site_pos[site], (9, 1)))
     found = compare_poses(model, samples=51)

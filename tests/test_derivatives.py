@@ -17,7 +17,26 @@ from mjwrap.kernels import layout
 from mjwrap.paths import ContactVelocity
 
 # Rows of obstacles, by the letters of `derivative_scenes.random_obstacle`.
-ROWS = ["c", "s", "e", "y", "t", "k", "p", "cc", "sc", "csc", "cvs", "b", "etk", "ypvte", "bk"]
+ROWS = [
+    "c",
+    "s",
+    "e",
+    "y",
+    "t",
+    "k",
+    "p",
+    "cc",
+    "sc",
+    "csc",
+    "cvs",
+    "b",
+    "etk",
+    "ypvte",
+    "bk",
+    "C",
+    "S",
+    "SvcvC",
+]
 CASES = 50
 STEP = 5e-4  # of the coarser quotient: 2.5e-5 m and 5e-4 rad
 FLOOR = 1e-9  # of quotients at half of it: what the tangency error of 1e-13 leaves

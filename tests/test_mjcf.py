@@ -113,21 +113,45 @@ def test_length_speed_jacobian_and_force_are_mujocos(tendon: str) -> None:
 # -------------------------------------------------------------------- native muscles that stay native
 
 
-def test_a_tendon_that_runs_inside_its_geom_stays_native() -> None:
-    tendon = EXTENSOR.replace('"elbow_side"', '"elbow_inside"')
-    found = read_declarations(compiled(tendon=tendon))
+def test_a_side_site_that_may_leave_its_geom_leaves_the_muscle_native() -> None:
+    """MuJoCo judges at every pose anew whether the string runs inside, and jumps."""
+    forearm = ARM.replace('<site name="via"', '<site name="shifting" pos="0.005 0 0"/><site name="via"')
+    tendon = EXTENSOR.replace('"elbow_side"', '"shifting"')
+    model = mujoco.MjModel.from_xml_string(
+        forearm.format(tendon=tendon, actuator=MUSCLE, custom="", option="")
+    )
+    found = read_declarations(model)
     assert found.muscles == []
-    assert "inside geom 'elbow' (side site 'elbow_inside' is inside)" in found.native["extensor"]
+    assert "runs inside geom 'elbow' changes with the pose: side site 'shifting'" in found.native["extensor"]
 
 
-@pytest.mark.parametrize("end", ["origin", "via"])
 @pytest.mark.parametrize("side", ['sidesite="elbow_side"', ""])
-def test_a_tendon_with_an_end_point_inside_its_geom_stays_native(end: str, side: str) -> None:
-    """At the reference pose, that is: MuJoCo goes straight through, and a path round it does not exist."""
-    tendon = EXTENSOR.replace(f'site="{end}"', 'site="elbow_inside"').replace('sidesite="elbow_side"', side)
-    found = read_declarations(compiled(tendon=tendon))
+def test_a_tendon_whose_end_point_may_leave_its_geom_stays_native(side: str) -> None:
+    """MuJoCo goes straight through while it is inside; a path round the geom does not exist then."""
+    tendon = EXTENSOR.replace('site="via"', 'site="within"').replace('sidesite="elbow_side"', side)
+    forearm = ARM.replace('<site name="via"', '<site name="within" pos="0.005 0 0"/><site name="via"')
+    model = mujoco.MjModel.from_xml_string(
+        forearm.format(tendon=tendon, actuator=MUSCLE, custom="", option="")
+    )
+    found = read_declarations(model)
     assert found.muscles == []
-    assert "no path can go round geom 'elbow': site 'elbow_inside' is inside it" in found.native["extensor"]
+    assert "no path can go round geom 'elbow': site 'within' is inside it" in found.native["extensor"]
+
+
+@pytest.mark.parametrize(("share", "stays"), [(0.8, True), (0.2, False)])
+def test_a_muscle_without_a_path_at_most_poses_stays_native(share: float, stays: bool) -> None:
+    """Its end is outside at the reference pose, and inside over the last part of the joint's range of 1 rad."""
+    reach, middle = 0.02, 1 - share / 2
+    centre = f"{reach * np.cos(middle)} {reach * np.sin(middle)} 0"
+    xml = f"""<mujoco><compiler angle="radian"/><worldbody><site name="a" pos="-0.1 0 0.05"/>
+      <geom name="ball" size="{2 * reach * np.sin(share / 4)}" pos="{centre}" contype="0" conaffinity="0"/>
+      <body><joint axis="0 0 1" range="0 1" limited="true"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+        <site name="b" pos="{reach} 0 0"/></body></worldbody>
+      <tendon><spatial name="t"><site site="a"/><geom geom="ball"/><site site="b"/></spatial></tendon>
+      <actuator><muscle name="m" tendon="t" lengthrange="0.1 0.2"/></actuator></mujoco>"""
+    found = read_declarations(mujoco.MjModel.from_xml_string(xml))
+    assert (found.muscles == []) == stays
+    assert ("site 'b' is inside it there" in found.native.get("m", "")) == stays
 
 
 FIXED = EXTENSOR + '<fixed name="sum"><joint joint="elbow" coef="1"/></fixed>'
@@ -151,16 +175,16 @@ STAYS_NATIVE = {
         f'<general name="m" tendon="extensor" gaintype="muscle" biastype="affine" {CURVES}/>',
         "bias is not a muscle's",
     ),
-    "two sets": (
-        EXTENSOR,
-        f'<general name="m" tendon="extensor" gaintype="muscle" biastype="muscle" {CURVES}'
-        ' biasprm="0.75 1.05 90 200 0.5 1.6 1.5 1.3 1.2"/>',
-        "different parameters",
-    ),
     "early": (
         EXTENSOR,
-        f'<general name="m" tendon="extensor" gaintype="muscle" dyntype="filter" actearly="true" {CURVES}/>',
-        "acts early",
+        f'<general name="m" tendon="extensor" gaintype="muscle" dyntype="user" actdim="1" actearly="true" {CURVES}/>',
+        "other dynamics than",
+    ),
+    "early with a delay": (
+        EXTENSOR,
+        '<general name="m" tendon="extensor" gaintype="muscle" dyntype="filter" actearly="true" delay="0.01"'
+        f' nsample="8" {CURVES}/>',
+        "early (actearly) and its control with a delay",
     ),
     "delay": (
         EXTENSOR,

@@ -274,8 +274,8 @@ UNFIT = {
         "neither fixed, affine",
     ),
     "early": (
-        '<general name="extensor" tendon="extensor" dyntype="filter" dynprm="0.1" actearly="true"/>',
-        "its activation acts early (actearly)",
+        '<general name="extensor" tendon="extensor" dyntype="user" actdim="1" actearly="true"/>',
+        "its activation acts early (actearly) and has other dynamics",
     ),
     "delay": ('<motor name="extensor" tendon="extensor" delay="0.01" nsample="8"/>', "acts with a delay"),
 }

@@ -151,6 +151,8 @@ def hill_from_mujoco(
         notes += (
             f"the actuator's force range limits its tension to {least:.4g} N; the Hill-type muscle's is not",
         )
+    if law.passive is not None:
+        notes += ("its passive force has parameters of its own; the Hill-type muscle's is that of its law",)
     muscle = DeGrooteFregly2016(
         max_isometric_force=peak / math.cos(fiber.pennation_angle),
         optimal_fiber_length=fiber.optimal_fiber_length,

@@ -35,6 +35,8 @@ class Fault(enum.IntEnum):
     NOT_GEODESIC = 7
     LONG_WAY = 8
     WRONG_LENGTH = 9
+    BESIDE = 10
+    UNEVEN = 11
 
     @property
     def words(self) -> str:
@@ -52,6 +54,8 @@ _WORDS = {
     Fault.CORNER: "it meets the surface with a corner of {:.2g} rad",
     Fault.NOT_GEODESIC: "what lies on the surface misses the geodesic by {:.2g} m",
     Fault.LONG_WAY: "it takes the long way round the sphere ({:.2g} rad about its centre), a saddle, not a minimum",
+    Fault.BESIDE: "it is to be held inside, and passes {:.2g} m beside the surface",
+    Fault.UNEVEN: "held inside, it meets and leaves the surface at angles {:.2g} rad apart, so it is not the shortest",
     Fault.WRONG_LENGTH: "its length differs by {:.2g} m from its own segments and arcs",
 }
 
@@ -116,6 +120,43 @@ def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: 
         ):
             fault, measure = np.where(here, name, fault), np.where(here, size, measure)
     return Judgement(fault.astype(np.int64), measure, arc, turn, middle)
+
+
+def judge_held(
+    cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array
+) -> Judgement:
+    """Judge paths that are held inside: the shortest from a to b that meet the solid; p = q where `touched`.
+
+    Straight through it, or with one corner on it where both segments, outside, make the same angle with the normal:
+    the problem is convex, so that is enough.
+    """
+    zeros = np.zeros(len(a))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        middle = nearest(a, b, cylinder)
+        beside = _norm(middle) - radius
+        n = _radial(p, cylinder) / _norm(_radial(p, cylinder))[:, None]
+        near, far = _norm(p - a), _norm(b - p)
+        e, f = (p - a) / near[:, None], (b - p) / far[:, None]
+        corner = e - f
+        uneven = _norm(corner - _dot(corner, n)[:, None] * n)
+        uneven = np.maximum(uneven, np.maximum(_dot(e, n), -_dot(f, n)))
+        rounding = 1e-15 * np.maximum(_norm(a), _norm(b)) / np.minimum(near, far)
+        off = np.maximum(np.abs(_norm(_radial(p, cylinder)) - radius), _norm(p - q))
+        fault, measure = zeros, zeros
+        for here, name, size in (  # the last that holds is the one that is told
+            (~touched & (beside > DEPTH * radius), Fault.BESIDE, beside),
+            (touched & (uneven > ANGLE + 10.0 * rounding), Fault.UNEVEN, uneven),
+            (touched & (off > ANGLE * radius), Fault.OFF_SURFACE, off),
+            (
+                ~np.isfinite(a + b + np.where(touched[:, None], p + q, 0.0)).all(axis=1),
+                Fault.NON_FINITE,
+                zeros,
+            ),
+        ):
+            fault, measure = np.where(here, name, fault), np.where(here, size, measure)
+    return Judgement(
+        fault.astype(np.int64), measure, zeros, zeros, np.where(touched[:, None], radius * n, middle)
+    )
 
 
 def _judge_straight(cylinder: bool, radius: float, a: Array, b: Array) -> tuple[Array, ...]:

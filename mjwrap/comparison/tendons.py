@@ -9,39 +9,41 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.mjcf import MuscleDeclaration, tendon_stops
 
 Array = NDArray[np.float64]
-_SITE, _PULLEY = int(mujoco.mjtWrap.mjWRAP_SITE), int(mujoco.mjtWrap.mjWRAP_PULLEY)
 _PULLEY_MARK = -2  # in wrap_obj; sites are -1, geoms their id
-_SURFACES = (int(mujoco.mjtWrap.mjWRAP_SPHERE), int(mujoco.mjtWrap.mjWRAP_CYLINDER))
 
 
 class Span(NamedTuple):
-    """A part of a tendon from one site to the next: over a geom (-1: none), counted with a weight (pulleys)."""
+    """A part of a tendon from one site to the next: over a geom (-1: none), counted with a weight (pulleys).
+
+    inside: it is held to the geom's solid.
+    """
 
     start: int
     end: int
     geom: int
     hint: int
     weight: float
+    inside: bool = False
 
 
-def tendon_spans(model: mujoco.MjModel, tendon: int) -> list[Span]:
-    """Return the spans of a spatial tendon in order."""
+def tendon_spans(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Span]:
+    """Return the spans of a spatial tendon in order. poses: any, with kinematics."""
     spans: list[Span] = []
-    last, geom, hint, weight = -1, -1, -1, 1.0
-    first = int(model.tendon_adr[tendon])
-    for w in range(first, first + int(model.tendon_num[tendon])):
-        kind, index, parameter = int(model.wrap_type[w]), int(model.wrap_objid[w]), float(model.wrap_prm[w])
-        if kind == _PULLEY:
-            last, geom, hint, weight = -1, -1, -1, 1.0 / parameter
-        elif kind in _SURFACES:
-            geom, hint = index, round(parameter) if parameter >= 0.0 else -1
-        elif kind == _SITE:
+    last, geom, hint, weight, inside = -1, -1, -1, 1.0, False
+    for stop in tendon_stops(model, poses, tendon):
+        if stop.kind == "pulley":
+            last, geom, hint, weight, inside = -1, -1, -1, 1.0 / stop.divisor, False
+        elif stop.kind == "geom":
+            geom, inside = stop.index, stop.inside
+        elif stop.kind == "hint":
+            hint = stop.index
+        else:
             if last >= 0:
-                spans.append(Span(last, index, geom, hint, weight))
-            last, geom, hint = index, -1, -1
+                spans.append(Span(last, stop.index, geom, hint, weight, inside))
+            last, geom, hint, inside = stop.index, -1, -1, False
     return spans
 
 
@@ -49,16 +51,16 @@ def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
     """Return the spans of a declared muscle, or None where it has several geoms between two sites."""
     spans: list[Span] = []
     for route in muscle.routes:
-        last, geom, hint = route.origin, -1, -1
+        last, geom, hint, inside = route.origin, -1, -1, False
         for node in route.nodes:
             if node.geom >= 0:
                 if geom >= 0:
                     return None
-                geom, hint = node.geom, node.hint_site
+                geom, hint, inside = node.geom, node.hint_site, node.inside
             else:
-                spans.append(Span(last, node.site, geom, hint, route.weight))
-                last, geom, hint = node.site, -1, -1
-        spans.append(Span(last, route.insertion, geom, hint, route.weight))
+                spans.append(Span(last, node.site, geom, hint, route.weight, inside))
+                last, geom, hint, inside = node.site, -1, -1, False
+        spans.append(Span(last, route.insertion, geom, hint, route.weight, inside))
     return spans
 
 
@@ -94,9 +96,8 @@ class WrapRecord:
         self.adr[k], self.num[k] = data.ten_wrapadr, data.ten_wrapnum
         self.obj[k], self.pos[k] = data.wrap_obj.reshape(-1), data.wrap_xpos.reshape(-1, 3)
 
-    def spans(self, tendon: int) -> list[SpanPoints]:
+    def points(self, tendon: int, spans: list[Span]) -> list[SpanPoints]:
         """Return the points of a tendon's spans at all kept poses."""
-        spans = tendon_spans(self.model, tendon)
         found = [SpanPoints.empty(len(self.obj)) for _ in spans]
         width = int(self.num[:, tendon].max(initial=0))
         index = self.adr[:, tendon, None] + np.arange(width)

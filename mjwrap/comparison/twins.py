@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.geometry import Fault, judge
+from mjwrap.comparison.geometry import Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
 from mjwrap.poses import Motion
 from mjwrap.system import MuscleSystem
@@ -89,6 +89,7 @@ class Comparer:
         off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._native.opt.disableflags |= int(off)
         self._native_data = mujoco.MjData(self._native)
+        mujoco.mj_kinematics(self._native, self._native_data)
         self.data = mujoco.MjData(self.model)
         self.left_out: dict[str, str] = {}
         self._pairs: list[_Pair] = []
@@ -108,14 +109,14 @@ class Comparer:
             if declared.tendon < 0:
                 return "it has no tendon in MuJoCo"
             own = muscle_spans(declared)
-            if own is None or own != tendon_spans(model, declared.tendon):
+            if own is None or own != tendon_spans(model, self._native_data, declared.tendon):
                 return "its tendon is a placeholder: mjwrap's route is another one"
             return _Pair(name, index, declared.tendon, own)
         actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if actuator < 0 or int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
             return "it has no spatial tendon"
         tendon = int(model.actuator_trnid[actuator, 0])
-        spans = tendon_spans(model, tendon)
+        spans = tendon_spans(model, self._native_data, tendon)
         return _Pair(name, -1, tendon, spans) if spans else "it has no spatial tendon"
 
     def evaluate(self, motion: Motion, start: Array | None = None) -> Batch:
@@ -139,7 +140,7 @@ class Comparer:
             contacts.append({i: self.muscles.contact_points(i) for i in taken})
         batch = Batch(motion)
         for name, index, tendon, spans in self._pairs:
-            points = wraps.spans(tendon)
+            points = wraps.points(tendon, spans)
             record = self._record(spans, points, geoms, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)
             if index >= 0:
@@ -193,9 +194,9 @@ class Comparer:
             )
             arc = np.zeros(count)
             if span.geom >= 0:
-                found = judge(*_in_frame(self.model, span.geom, geoms, at))
+                found = (judge_held if span.inside else judge)(*_in_frame(self.model, span.geom, geoms, at))
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
-                if span.hint >= 0:
+                if span.hint >= 0 and not span.inside:
                     side = geoms.local(span.geom, geoms.sites[:, span.hint])
                     hinted[:, s] = np.einsum("ti,ti->t", found.middle[:, :2], side[:, :2]) > 0.0
                 new = (found.fault > 0) & (fault == 0)
@@ -295,5 +296,6 @@ def _misfit(span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geom
         if int(model.geom_type[span.geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
             local[2] = 0.0
         distance = float(np.linalg.norm(local))
-        misfit = max(misfit, abs(distance - radius), abs(float(local @ away)) / max(distance, 1e-300))
+        corner = 0.0 if span.inside else abs(float(local @ away)) / max(distance, 1e-300)
+        misfit = max(misfit, abs(distance - radius), corner)
     return misfit

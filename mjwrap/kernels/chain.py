@@ -10,6 +10,7 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.certify import minimal
 from mjwrap.kernels.geodesics import displace
+from mjwrap.kernels.inside import hold_inside
 from mjwrap.kernels.jumps import solve_span
 from mjwrap.kernels.newton import evaluate
 from mjwrap.kernels.relax import path_length
@@ -46,7 +47,11 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
             total += straight
         else:
             ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
-            code, part, error, i, e = solve_span(start, k, ends, node, tol, direct)
+            if node[start, lay.INSIDE] > 0.0:
+                code, part, error, i = hold_inside(start, ends, node, tol)
+                e = i
+            else:
+                code, part, error, i, e = solve_span(start, k, ends, node, tol, direct)
             if not math.isfinite(part):
                 part, code = straight, lay.NOT_CONVERGED
             if not math.isfinite(error):
@@ -116,7 +121,7 @@ def set_rotation(node, k, w, x, y, z):
 def extrapolate(node, before):
     """Start from the straight continuation of the last two poses where both touch; keep the last in `before`."""
     for k in range(node.shape[0]):
-        both = node[k, S_MODE] == lay.TOUCHED and before[k, 0] == lay.TOUCHED
+        both = node[k, S_MODE] == lay.TOUCHED and before[k, 0] == lay.TOUCHED and node[k, lay.INSIDE] == 0.0
         for i in range(lay.STATE):
             last = node[k, S_MODE + i]
             if both and i > 1:

@@ -56,7 +56,7 @@ def _roll_back(lo, hi, cold, node):
     for k in range(lo, hi):
         if cold:
             node[k, lay.S_MODE] = lay.COLD
-        elif node[k, lay.KIND] != lay.VIA:
+        elif node[k, lay.KIND] != lay.VIA and node[k, lay.INSIDE] == 0.0:
             for i in range(lay.STATE):
                 node[k, lay.S_MODE + i] = node[k, lay.W_OLD + i]
 

@@ -24,33 +24,41 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
+from mjwrap.kernels.corners import list_corner, slide_corner, stiffen_corner, turn_corner
 from mjwrap.kernels.newton import ON_SURFACE
-
-D_SLOT = 0
-D_TOUCHED = 1
-D_P = 2  # P from the pose's origin (3) [m]
-D_Q = 5  # Q from the pose's origin (3) [m]
-D_E = 8  # unit vector of the segment that arrives (3)
-D_L = 11  # its length [m]
-D_NP = 12  # n_P, n_Q, b_P, b_Q (3 each), in the order of the node row
-D_NQ = 15
-D_BP = 18
-D_BQ = 21
-D_R = 24  # Jacobi field r at Q [m]
-D_KP = 25  # kappa, tau at P
-D_KQ = 27  # kappa, tau at Q
-D_COS = 29  # b_P . b_Q of the stop before
-D_FIELD = 30  # a + c r: the Jacobi field that the path before P allows
-D_PIVOT = 31  # 1 + c L of the segment that leaves
-D_C = 32  # stiffness c behind Q [1/m]
-D_U = 33  # difference of material velocities over the segment that arrives (3)
-D_GP = 36  # slope of the energy at P and at Q, the path before eliminated
-D_GQ = 37
-D_X = 38  # shift of P along b_P, of Q along b_Q
-D_Y = 39
-D_RATE = 40  # rate of e (3)
-D_ROW = 43  # of the node, from the chain's first one
-STOP = 44
+from mjwrap.kernels.stops import (
+    CORNER,
+    D_BP,
+    D_BQ,
+    D_C,
+    D_COS,
+    D_E,
+    D_FIELD,
+    D_GP,
+    D_GQ,
+    D_KP,
+    D_KQ,
+    D_L,
+    D_NP,
+    D_NQ,
+    D_P,
+    D_PIVOT,
+    D_Q,
+    D_R,
+    D_RATE,
+    D_ROW,
+    D_SLIDE,
+    D_SLOT,
+    D_TOUCHED,
+    D_U,
+    D_X,
+    D_Y,
+    FIXED,
+    STOP,
+    TANGENT,
+    dot,
+    spin,
+)  # fmt: skip
 
 SOUND = 0
 VANISHING = 1  # a segment has no length: its direction has no derivative
@@ -63,16 +71,6 @@ SHORTEST = 1e-150  # [m]
 
 
 @jit
-def _dot(stop, i, left, j, right):
-    """Return the dot product of two column triples of two stops."""
-    return (
-        stop[i, left] * stop[j, right]
-        + stop[i, left + 1] * stop[j, right + 1]
-        + stop[i, left + 2] * stop[j, right + 2]
-    )
-
-
-@jit
 def _arrive(k, node, x, y, z, px, py, pz, i, stop):
     """Enter the segment from (x, y, z) to (px, py, pz) that ends at stop i, node k; return whether it has a length."""
     ex, ey, ez = px - x, py - y, pz - z
@@ -81,10 +79,10 @@ def _arrive(k, node, x, y, z, px, py, pz, i, stop):
     good = size > SHORTEST
     over = 1.0 / (size + SHORTEST)
     ex, ey, ez = ex * over, ey * over, ez * over
-    if stop[i, D_TOUCHED] != 0.0 and size <= ON_SURFACE * node[k, lay.SIZE]:
+    if stop[i, D_TOUCHED] != FIXED and size <= ON_SURFACE * node[k, lay.SIZE]:
         good = False
         ex, ey, ez = node[k, lay.W_TP], node[k, lay.W_TP + 1], node[k, lay.W_TP + 2]
-    elif stop[i - 1, D_TOUCHED] != 0.0 and size <= ON_SURFACE * node[near, lay.SIZE]:
+    elif stop[i - 1, D_TOUCHED] != FIXED and size <= ON_SURFACE * node[near, lay.SIZE]:
         good = False
         ex, ey, ez = node[near, lay.W_TQ], node[near, lay.W_TQ + 1], node[near, lay.W_TQ + 2]
     stop[i, D_E] = ex
@@ -119,7 +117,9 @@ def list_stops(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, stop):
             stop[i, D_SLOT] = owner[k - lo] + 1
         else:
             stop[i, D_SLOT] = owner[k - 1 - lo] + 2 if hi > lo else 1
-        stop[i, D_TOUCHED] = 1.0 if touched else 0.0
+        stop[i, D_TOUCHED] = FIXED
+        if touched:
+            stop[i, D_TOUCHED] = CORNER if node[k, lay.INSIDE] > 0.0 else TANGENT
         cx, cy, cz = ix - ox, iy - oy, iz - oz
         if k < hi:
             cx, cy, cz = node[k, lay.POS] - ox, node[k, lay.POS + 1] - oy, node[k, lay.POS + 2] - oz
@@ -128,7 +128,10 @@ def list_stops(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, stop):
             px, py, pz = node[k, lay.W_P], node[k, lay.W_P + 1], node[k, lay.W_P + 2]
         if not _arrive(k, node, x, y, z, px, py, pz, i, stop) and fault == SOUND:
             fault, where = VANISHING, int(stop[i - 1, D_SLOT])
-        if stop[i - 1, D_TOUCHED] != 0.0:
+        if stop[i - 1, D_TOUCHED] == CORNER:
+            if not stiffen_corner(i - 1, stop) > MARGIN and fault == SOUND:
+                fault, where = MARGINAL, int(stop[i - 1, D_SLOT])
+        elif stop[i - 1, D_TOUCHED] == TANGENT:
             _square(i - 1, D_BQ, i, stop)
             stop[i - 1, D_PIVOT] = 1.0 + stop[i - 1, D_C] * stop[i, D_L]
             if not stop[i - 1, D_PIVOT] > MARGIN and fault == SOUND:
@@ -142,6 +145,9 @@ def list_stops(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, stop):
             stop[i, D_Q] = x - cx
             stop[i, D_Q + 1] = y - cy
             stop[i, D_Q + 2] = z - cz
+            if stop[i, D_TOUCHED] == CORNER:
+                list_corner(k, node, i, stop)
+                continue
             for column in range(12):
                 stop[i, D_NP + column] = node[k, lay.W_NP + column]
             stop[i, D_R] = node[k, lay.W_JAC + 2]
@@ -161,7 +167,7 @@ def _square(i, binormal, j, stop):
 
     With that the Hessian is symmetric to rounding, not to the tangency error.
     """
-    along = _dot(stop, i, binormal, j, D_E)
+    along = dot(stop, i, binormal, j, D_E)
     for c in range(3):
         stop[i, binormal + c] -= along * stop[j, D_E + c]
 
@@ -171,8 +177,8 @@ def _eliminate(k, node, i, stop):
     """Carry the stiffness c from Q of the stop before over the segment to P of stop i, and along its geodesic to Q."""
     over = 1.0 / (stop[i, D_L] + SHORTEST)
     c = over
-    if stop[i - 1, D_TOUCHED] != 0.0:
-        turn = _dot(stop, i, D_BP, i - 1, D_BQ)
+    if stop[i - 1, D_TOUCHED] == TANGENT:
+        turn = dot(stop, i, D_BP, i - 1, D_BQ)
         stop[i, D_COS] = turn
         c = (1.0 - turn * turn + stop[i - 1, D_C] * stop[i, D_L]) * over / stop[i - 1, D_PIVOT]
     a, da = node[k, lay.W_JAC], node[k, lay.W_JAC + 1]
@@ -197,34 +203,30 @@ def _gap(i, twist, stop):
 
 
 @jit
-def _spin(i, column, twist, stop):
-    """Return the angular velocity of stop i's body along the vector in `column`."""
-    k = int(stop[i, D_SLOT])
-    return (
-        twist[k, 3] * stop[i, column] + twist[k, 4] * stop[i, column + 1] + twist[k, 5] * stop[i, column + 2]
-    )
-
-
-@jit
 def shift(count, twist, stop):
     """Find the shifts x, y of all contact points and the rate of every segment's direction as the poses move."""
     for i in range(1, count):
         _gap(i, twist, stop)
-        if stop[i, D_TOUCHED] != 0.0:
-            g = _dot(stop, i, D_U, i, D_BP)
-            if stop[i - 1, D_TOUCHED] != 0.0:
-                along = _dot(stop, i, D_U, i - 1, D_BQ) - stop[i - 1, D_GQ] * stop[i, D_L]
+        if stop[i, D_TOUCHED] == TANGENT:
+            g = dot(stop, i, D_U, i, D_BP)
+            if stop[i - 1, D_TOUCHED] == TANGENT:
+                along = dot(stop, i, D_U, i - 1, D_BQ) - stop[i - 1, D_GQ] * stop[i, D_L]
                 g -= stop[i, D_COS] * along / stop[i - 1, D_PIVOT]
-            g = g / stop[i, D_L] + _spin(i, D_NP, twist, stop)
+            g = g / stop[i, D_L] + spin(i, D_NP, twist, stop)
             stop[i, D_GP] = g
-            stop[i, D_GQ] = g / stop[i, D_FIELD] - _spin(i, D_NQ, twist, stop)
+            stop[i, D_GQ] = g / stop[i, D_FIELD] - spin(i, D_NQ, twist, stop)
     for i in range(count - 1, 0, -1):
-        x = stop[i, D_X]
-        u = stop[i, D_U] + x * stop[i, D_BP]
-        v = stop[i, D_U + 1] + x * stop[i, D_BP + 1]
-        w = stop[i, D_U + 2] + x * stop[i, D_BP + 2]
+        u, v, w = stop[i, D_U], stop[i, D_U + 1], stop[i, D_U + 2]
         j = i - 1
-        if stop[j, D_TOUCHED] != 0.0:
+        if stop[i, D_TOUCHED] == CORNER:
+            u, v, w = u + stop[i, D_SLIDE], v + stop[i, D_SLIDE + 1], w + stop[i, D_SLIDE + 2]
+        else:
+            x = stop[i, D_X]
+            u, v, w = u + x * stop[i, D_BP], v + x * stop[i, D_BP + 1], w + x * stop[i, D_BP + 2]
+        if stop[j, D_TOUCHED] == CORNER:
+            slide_corner(j, twist, stop)
+            u, v, w = u - stop[j, D_SLIDE], v - stop[j, D_SLIDE + 1], w - stop[j, D_SLIDE + 2]
+        elif stop[j, D_TOUCHED] == TANGENT:
             y = u * stop[j, D_BQ] + v * stop[j, D_BQ + 1] + w * stop[j, D_BQ + 2]
             y = (y - stop[j, D_GQ] * stop[i, D_L]) / stop[j, D_PIVOT]
             stop[j, D_Y] = y
@@ -268,8 +270,8 @@ def _turn(sign, i, arm, j, twist, stop, out):
     spin_e = sign * 0.5 * (
         twist[k, 3] * stop[j, D_E] + twist[k, 4] * stop[j, D_E + 1] + twist[k, 5] * stop[j, D_E + 2]
     )  # fmt: skip
-    spin_arm = sign * 0.5 * _spin(i, arm, twist, stop)
-    along = sign * _dot(stop, i, arm, j, D_E)
+    spin_arm = sign * 0.5 * spin(i, arm, twist, stop)
+    along = sign * dot(stop, i, arm, j, D_E)
     for c in range(3):
         out[k, 3 + c] += spin_e * stop[i, arm + c] + spin_arm * stop[j, D_E + c] - along * twist[k, 3 + c]
 
@@ -285,10 +287,14 @@ def add_stiffness_times(count, twist, stop, out):
     for i in range(1, count):
         _pull(1.0, i, D_P, i, D_RATE, stop, out)
         _pull(-1.0, i - 1, D_Q, i, D_RATE, stop, out)
-        if stop[i, D_TOUCHED] != 0.0:
-            k = int(stop[i, D_SLOT])
-            _turn(1.0, i, D_P, i, twist, stop, out)
-            _turn(-1.0, i, D_Q, i + 1, twist, stop, out)
+        if stop[i, D_TOUCHED] == FIXED:
+            continue
+        k = int(stop[i, D_SLOT])
+        _turn(1.0, i, D_P, i, twist, stop, out)
+        _turn(-1.0, i, D_Q, i + 1, twist, stop, out)
+        if stop[i, D_TOUCHED] == CORNER:
+            turn_corner(i, stop, out)
+        else:
             for c in range(3):
                 out[k, 3 + c] += stop[i, D_X] * stop[i, D_NP + c] - stop[i, D_Y] * stop[i, D_NQ + c]
 
@@ -304,7 +310,7 @@ def stiffness(count, stop, twist, out, matrix):
                 matrix[6 * k + c, j] = 0.0
     for i in range(count):
         k = int(stop[i, D_SLOT])
-        for c in range(6 if stop[i, D_TOUCHED] != 0.0 else 3):
+        for c in range(6 if stop[i, D_TOUCHED] != FIXED else 3):
             for j in range(count):
                 for d in range(6):
                     out[int(stop[j, D_SLOT]), d] = 0.0
@@ -326,16 +332,23 @@ def contact_rates(count, twist, size, stop, out):
     """
     shift(count, twist, stop)
     for i in range(1, count):
-        if stop[i, D_TOUCHED] == 0.0:
+        if stop[i, D_TOUCHED] == FIXED:
             continue
         k = int(stop[i, D_ROW])
+        if stop[i, D_TOUCHED] == CORNER:
+            for column in (0, 3):
+                _carry(i, D_P, twist, stop, out, column)
+                for c in range(3):
+                    out[k, column + c] += stop[i, D_SLIDE + c]
+            out[k, 6] = 0.0
+            continue
         least = FLATTEST / size[k]
         if not (abs(stop[i, D_KP]) > least and abs(stop[i, D_KQ]) > least):
             return FLAT, int(stop[i, D_SLOT])
-        slide = _dot(stop, i, D_RATE, i, D_NP) - _spin(i, D_BP, twist, stop)
+        slide = dot(stop, i, D_RATE, i, D_NP) - spin(i, D_BP, twist, stop)
         slide = -(slide + stop[i, D_KP + 1] * stop[i, D_X]) / stop[i, D_KP]
         _velocity(i, D_P, i, slide, stop[i, D_X], D_BP, twist, stop, out, 0)
-        slide_q = _dot(stop, i + 1, D_RATE, i, D_NQ) - _spin(i, D_BQ, twist, stop)
+        slide_q = dot(stop, i + 1, D_RATE, i, D_NQ) - spin(i, D_BQ, twist, stop)
         slide_q = -(slide_q + stop[i, D_KQ + 1] * stop[i, D_Y]) / stop[i, D_KQ]
         _velocity(i, D_Q, i + 1, slide_q, stop[i, D_Y], D_BQ, twist, stop, out, 3)
         out[k, 6] = slide_q - slide
@@ -343,13 +356,20 @@ def contact_rates(count, twist, size, stop, out):
 
 
 @jit
-def _velocity(i, arm, j, slide, sideways, binormal, twist, stop, out, column):
-    """Write the velocity of a contact point of stop i: carried along, sliding along e of stop j, shifting along b."""
+def _carry(i, arm, twist, stop, out, column):
+    """Write the velocity of the point at the end of `arm` that the body of stop i carries along."""
     k = int(stop[i, D_SLOT])
     x, y, z = stop[i, arm], stop[i, arm + 1], stop[i, arm + 2]
     row = int(stop[i, D_ROW])
     out[row, column] = twist[k, 0] + twist[k, 4] * z - twist[k, 5] * y
     out[row, column + 1] = twist[k, 1] + twist[k, 5] * x - twist[k, 3] * z
     out[row, column + 2] = twist[k, 2] + twist[k, 3] * y - twist[k, 4] * x
+
+
+@jit
+def _velocity(i, arm, j, slide, sideways, binormal, twist, stop, out, column):
+    """Write the velocity of a contact point of stop i: carried along, sliding along e of stop j, shifting along b."""
+    row = int(stop[i, D_ROW])
+    _carry(i, arm, twist, stop, out, column)
     for c in range(3):
         out[row, column + c] += slide * stop[j, D_E + c] + sideways * stop[i, binormal + c]

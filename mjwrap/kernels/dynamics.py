@@ -12,30 +12,36 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.activation import advance, rate
+from mjwrap.kernels.early import next_activation
 from mjwrap.kernels.fiber import ELASTIC, LEAST, equilibrium, rigid_fiber, step_fiber, tendon_force
 from mjwrap.kernels.muscle import DEGROOTE_FREGLY, MILLARD
 from mjwrap.kernels.muscle import tension as law_tension
 
 # where a muscle's state comes from
-FROM_ACT, FROM_CTRL, OWN, DIRECT, KEPT = 0, 1, 2, 3, 4
+FROM_ACT, FROM_CTRL, OWN, DIRECT, KEPT, EARLY = 0, 1, 2, 3, 4, 5
+TIMES = 5  # columns of `times`: two time constants [s] and smoothness; EARLY: see `early.next_activation`
 NO_FIBER = 0.0  # stands where no fibre length is known: the muscle starts at static equilibrium
 
 
 @jit
 def read_states(
-    source, index, control, low, high, act, ctrl, own, excitation, since, activation, fiber, drive
-):
+    source, index, control, low, high, form, times, act, ctrl, own, excitation, since, timestep,
+    activation, fiber, drive,
+):  # fmt: skip
     """Write activation, fibre length [m] and excitation of every muscle (n,), `since` [s] after a step's start.
 
     What mjwrap integrates is read at the start only: a later stage of Runge-Kutta goes on from there.
-    Activations: FROM_ACT act[index]; FROM_CTRL the drive; DIRECT the drive; OWN own[m, 0]; KEPT act[index], with the
-    fibre length beside it. The drive is the excitation for OWN and DIRECT, else ctrl[control] clamped to [low, high].
+    Activations: FROM_ACT act[index]; EARLY what that will be a `timestep` [s] later; FROM_CTRL the drive; DIRECT the
+    drive; OWN own[m, 0]; KEPT act[index], with the fibre length beside it. The drive is the excitation for OWN and
+    DIRECT, else ctrl[control] clamped to [low, high].
     """
     for m in range(source.shape[0]):
         own_drive = source[m] == OWN or source[m] == DIRECT
         drive[m] = excitation[m] if own_drive else min(max(ctrl[control[m]], low[m]), high[m])
         if source[m] == FROM_ACT:
             activation[m] = act[index[m]]
+        elif source[m] == EARLY:
+            activation[m] = next_activation(form[m], times, m, act[index[m]], drive[m], timestep)
         elif source[m] == FROM_CTRL or source[m] == DIRECT:
             activation[m] = drive[m]
         elif since <= 0.0:

@@ -10,7 +10,7 @@ from mjwrap.kernels.dynamics import drive_muscles, read_states
 @jit
 def evaluate(
     routes, weights, links, law, params, source, index, control, ctrl_low, ctrl_high, form, times, off, body_rootid,
-    site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, xipos, act, ctrl, own, excitation, since, ahead, tol,
+    site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, xipos, act, ctrl, own, excitation, since, ahead, timestep, tol,
     node, seg, seg_count, info, drive, start_activation, start_fiber, start_length,
     activation, fiber, length, velocity, tension, next_activation, next_fiber, status, wrench,
 ):  # fmt: skip
@@ -21,7 +21,7 @@ def evaluate(
     """
     solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg, seg_count, info)
     read_states(
-        source, index, control, ctrl_low, ctrl_high, act, ctrl, own, excitation, since,
+        source, index, control, ctrl_low, ctrl_high, form, times, act, ctrl, own, excitation, since, timestep,
         start_activation, start_fiber, drive,
     )  # fmt: skip
     measure_muscles(

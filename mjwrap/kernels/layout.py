@@ -94,6 +94,7 @@ W_FIRST = 150  # in a span's first row: ||f||^2 of the contacts from which it st
 W_REPAIRS = 151  # in a span's first row: how often the path was begun anew, from another start or in strides
 W_PIN = 152  # 1 where Q is at the path's last point, which lies on the surface; 0 else
 W_LAND = 153  # 1 while Q is to go there, however far it is; 0 else
+INSIDE = 154  # 1 where the string is held to the solid, alone between two fixed points (`inside.py`); 0 else
 ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`

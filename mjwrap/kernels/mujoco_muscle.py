@@ -1,7 +1,8 @@
 """MuJoCo's own `<muscle>` curves (`mju_muscleGain`, `mju_muscleBias` in engine_util_misc.c).
 
 Columns of params: 0 range0, 1 range1, 2 force, 3 scale, 4 lmin, 5 lmax, 6 vmax, 7 fpmax, 8 fvmax (MuJoCo's gainprm),
-9, 10 length range of the actuator, 11 acc0, 12 gear, 13, 14 force range (-inf, inf where not limited).
+9, 10 length range of the actuator, 11 acc0, 12 gear, 13, 14 force range (-inf, inf where not limited); of the passive
+force (biasprm): 15 range0, 16 range1, 17 force, 18 scale, 19 lmax, 20 fpmax.
 """
 
 from __future__ import annotations
@@ -32,18 +33,24 @@ def gain_length(x, lmin, lmax):
 
 
 @jit
+def _scale(params, m, column):
+    """Return peak force [N] and optimal length of the four columns range0, range1, force, scale from `column` on."""
+    force = params[m, column + 2]
+    if force < 0.0:
+        force = params[m, column + 3] / max(MINVAL, params[m, 11])
+    width = max(MINVAL, params[m, column + 1] - params[m, column])
+    return force, (params[m, 10] - params[m, 9]) / width
+
+
+@jit
 def tension(params, m, activation, length, speed):
     """MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias` (engine_util_misc.c).
 
     Where MuJoCo's would push (negative activation, or a force range above zero) there is no tension.
     """
     gear = params[m, 12]
-    range0 = params[m, 0]
-    force = params[m, 2]
-    if force < 0.0:
-        force = params[m, 3] / max(MINVAL, params[m, 11])
-    optimal = (params[m, 10] - params[m, 9]) / max(MINVAL, params[m, 1] - range0)
-    x = range0 + (gear * length - params[m, 9]) / max(MINVAL, optimal)
+    force, optimal = _scale(params, m, 0)
+    x = params[m, 0] + (gear * length - params[m, 9]) / max(MINVAL, optimal)
     v = gear * speed / max(MINVAL, optimal * params[m, 6])
     y = params[m, 8] - 1.0
     if v <= -1.0:
@@ -55,14 +62,16 @@ def tension(params, m, activation, length, speed):
     else:
         rate = params[m, 8]
     gain = -force * gain_length(x, params[m, 4], params[m, 5]) * rate
-    b = 0.5 * (1.0 + params[m, 5])
+    force, optimal = _scale(params, m, 15)
+    x = params[m, 15] + (gear * length - params[m, 9]) / max(MINVAL, optimal)
+    b = 0.5 * (1.0 + params[m, 19])
     if x <= 1.0:
         bias = 0.0
     elif x <= b:
         z = (x - 1.0) / max(MINVAL, b - 1.0)
-        bias = -force * params[m, 7] * 0.5 * z * z
+        bias = -force * params[m, 20] * 0.5 * z * z
     else:
         z = (x - b) / max(MINVAL, b - 1.0)
-        bias = -force * params[m, 7] * (0.5 + z)
+        bias = -force * params[m, 20] * (0.5 + z)
     total = min(max(gain * activation + bias, params[m, 13]), params[m, 14])
     return max(-gear * total, 0.0)

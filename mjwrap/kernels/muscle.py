@@ -15,7 +15,7 @@ PATH_ACTUATOR = 0
 MUJOCO = mujoco_muscle.CODE
 DEGROOTE_FREGLY = degroote_fregly.CODE
 MILLARD = millard.CODE
-PARAMS = 16
+PARAMS = 21
 
 
 @jit

@@ -44,6 +44,10 @@ def polyline(lo, hi, ox, oy, oz, ix, iy, iz, node, spacing, out, first):
             px, py, pz = node[k, lay.POS], node[k, lay.POS + 1], node[k, lay.POS + 2]
             count = _straight(x, y, z, px, py, pz, spacing, out, count)
             x, y, z = px, py, pz
+        elif node[k, S_MODE] == lay.TOUCHED and node[k, lay.INSIDE] > 0.0:
+            px, py, pz = node[k, W_P] + ox, node[k, W_P + 1] + oy, node[k, W_P + 2] + oz
+            count = _straight(x, y, z, px, py, pz, spacing, out, count)
+            x, y, z = px, py, pz
         elif node[k, S_MODE] == lay.TOUCHED:
             arc = node[k, S_ARC]
             turn = arc * math.sqrt(node[k, lay.W_KP] ** 2 + node[k, lay.W_KP + 1] ** 2)

@@ -4,14 +4,16 @@ Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendo
 whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing here changes the model.
 """
 
-from mjwrap.mjcf.actuators import keeps_state
+from mjwrap.mjcf.actuators import EARLY_DYNAMICS, keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.files import read_model
 from mjwrap.mjcf.names import has_plugin, name_of, names
 from mjwrap.mjcf.reader import read_declarations
+from mjwrap.mjcf.routes import tendon_stops
 from mjwrap.mjcf.writing import set_laws
 
 __all__ = [
+    "EARLY_DYNAMICS",
     "Declarations",
     "MuscleDeclaration",
     "Node",
@@ -23,4 +25,5 @@ __all__ = [
     "read_declarations",
     "read_model",
     "set_laws",
+    "tendon_stops",
 ]

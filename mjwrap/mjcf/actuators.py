@@ -10,8 +10,10 @@ import mujoco
 import numpy as np
 
 from mjwrap.errors import ModelError
+from mjwrap.kernels import early
+from mjwrap.mjcf.inside import end_is_inside, side_is_inside
 from mjwrap.mjcf.names import name_of
-from mjwrap.mjcf.routes import tendon_stops
+from mjwrap.mjcf.routes import geoms_of, tendon_stops
 from mjwrap.muscles import MuJoCoMuscle
 
 OBJ = mujoco.mjtObj
@@ -21,6 +23,15 @@ _GAINS = [
 _BIASES = [
     int(b) for b in (mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE, mujoco.mjtBias.mjBIAS_MUSCLE)
 ]
+
+_NO_BIAS, _MUSCLE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
+_DYN = mujoco.mjtDyn
+EARLY_DYNAMICS = {  # dyntypes whose next activation the kernels know
+    int(_DYN.mjDYN_INTEGRATOR): early.INTEGRATOR,
+    int(_DYN.mjDYN_FILTER): early.FILTER,
+    int(_DYN.mjDYN_FILTEREXACT): early.FILTER_EXACT,
+    int(_DYN.mjDYN_MUSCLE): early.MUSCLE,
+}
 
 
 def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
@@ -54,9 +65,12 @@ def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
         return "its gain or bias is neither fixed, affine nor a muscle's"
     if int(model.actuator_plugin[actuator]) >= 0:
         return "it belongs to a plugin"
-    if model.actuator_actearly[actuator]:
-        return "its activation acts early (actearly)"
     keeps = keeps_state(model, actuator)
+    if model.actuator_actearly[actuator] and int(model.actuator_actnum[actuator]) > 0:
+        if int(model.actuator_dyntype[actuator]) not in EARLY_DYNAMICS:
+            return "its activation acts early (actearly) and has other dynamics than integrator, filter or muscle"
+        if float(model.actuator_delay[actuator]) > 0.0:
+            return "its activation acts early (actearly) and its control with a delay"
     if int(model.actuator_actnum[actuator]) > 1 and not keeps:
         return "it has several activation states, but not as dyntype='user' actdim='2' keeps them for mjwrap"
     if keeps and model.actuator_actlimited[actuator]:
@@ -90,14 +104,8 @@ def curves_reason(model: mujoco.MjModel, actuator: int) -> str | None:
         return "its gear is not positive, so it pushes"
     if model.tendon_actfrclimited[tendon]:
         return "its tendon limits the forces of its actuators together (actuatorfrcrange)"
-    bias = int(model.actuator_biastype[actuator])
-    muscle_bias = bias == int(mujoco.mjtBias.mjBIAS_MUSCLE)
-    if bias != int(mujoco.mjtBias.mjBIAS_NONE) and not muscle_bias:
+    if int(model.actuator_biastype[actuator]) not in (_NO_BIAS, _MUSCLE_BIAS):
         return "its bias is not a muscle's"
-    if muscle_bias and not np.array_equal(
-        model.actuator_gainprm[actuator, :9], model.actuator_biasprm[actuator, :9], equal_nan=True
-    ):
-        return "its gain and bias have different parameters"
     return None
 
 
@@ -112,39 +120,36 @@ def native_reason(model: mujoco.MjModel, rest: mujoco.MjData, actuator: int) -> 
 
 
 def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> str | None:
-    """Return which site is inside its geom at the reference pose, or None.
-
-    A side site there is MuJoCo's sign for a string that runs inside; from an end point there no path can go round.
-    """
-    stops = tendon_stops(model, tendon)
-    for k, stop in enumerate(stops):
-        if stop.kind != "geom":
+    """Return which site is inside its geom at the reference pose and may leave it at another one, or None."""
+    stops = tendon_stops(model, rest, tendon)
+    for k, side, ends in geoms_of(stops):
+        if stops[k].inside:
             continue
-        geom = f"geom '{name_of(model, OBJ.mjOBJ_GEOM, stop.index)}'"
-        beside = stops[k + 1] if stops[k + 1].kind == "hint" else None
-        if beside is not None and _is_inside(model, rest, stop.index, beside.index):
-            site = name_of(model, OBJ.mjOBJ_SITE, beside.index)
-            return f"its tendon runs inside {geom} (side site '{site}' is inside)"
-        for end in (stops[k - 1], stops[k + 1] if beside is None else stops[k + 2]):
-            if _is_inside(model, rest, stop.index, end.index):
-                site = name_of(model, OBJ.mjOBJ_SITE, end.index)
+        index = stops[k].index
+        geom = f"geom '{name_of(model, OBJ.mjOBJ_GEOM, index)}'"
+        if side >= 0 and side_is_inside(model, rest, index, side):
+            site = name_of(model, OBJ.mjOBJ_SITE, side)
+            return (
+                f"whether its tendon runs inside {geom} changes with the pose: side site '{site}', inside it at the "
+                f"reference pose, moves relative to it"
+            )
+        for end in ends:
+            if end_is_inside(model, rest, index, end):
+                site = name_of(model, OBJ.mjOBJ_SITE, end)
                 return f"no path can go round {geom}: site '{site}' is inside it at the reference pose"
     return None
-
-
-def _is_inside(model: mujoco.MjModel, rest: mujoco.MjData, geom: int, site: int) -> bool:
-    local = rest.geom_xmat[geom].reshape(3, 3).T @ (rest.site_xpos[site] - rest.geom_xpos[geom])
-    if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
-        local = local[:2]
-    return bool(np.linalg.norm(local) < model.geom_size[geom, 0] < np.inf)
 
 
 def mujoco_law(model: mujoco.MjModel, actuator: int) -> MuJoCoMuscle:
     """Return the native curves of a muscle actuator; `ModelError` where they are undefined."""
     output = int(model.actuator_outadr[actuator])
     prm = [float(p) for p in model.actuator_gainprm[actuator, :9]]
-    if int(model.actuator_biastype[actuator]) == int(mujoco.mjtBias.mjBIAS_NONE):
+    passive = None
+    if int(model.actuator_biastype[actuator]) == _NO_BIAS:
         prm[7] = 0.0
+    else:
+        bias = tuple(float(p) for p in model.actuator_biasprm[actuator, :9])
+        passive = None if bias == tuple(prm) else bias
     short, long = (float(x) for x in model.actuator_lengthrange[output])
     low, high = -np.inf, np.inf
     if model.actuator_forcelimited[actuator]:
@@ -160,4 +165,5 @@ def mujoco_law(model: mujoco.MjModel, actuator: int) -> MuJoCoMuscle:
         float(model.actuator_acc0[output]),
         float(model.actuator_gear[output, 0]),
         (low, high),
+        passive,
     )

@@ -11,12 +11,16 @@ from mjwrap.surfaces import Surface
 
 @dataclass(frozen=True)
 class Node:
-    """One stop of a route: a via site, or the surface in a geom's frame with, perhaps, a site as hint at its side."""
+    """One stop of a route: a via site, or the surface in a geom's frame with, perhaps, a site as hint at its side.
+
+    inside: the string is held to the solid, as by a side site inside, rather than kept out of it.
+    """
 
     site: int = -1
     geom: int = -1
     hint_site: int = -1
     surface: Surface | None = None
+    inside: bool = False
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,19 @@ class Route:
     nodes: tuple[Node, ...]
     insertion: int
     weight: float = 1.0
+
+    def geom_ends(self) -> list[tuple[Node, int, int]]:
+        """Return every node on a geom with the sites before and after it."""
+        stops = [self.origin, *(node.site for node in self.nodes), self.insertion]
+        return [
+            (
+                node,
+                next(s for s in stops[place - 1 :: -1] if s >= 0),
+                next(s for s in stops[place:] if s >= 0),
+            )
+            for place, node in enumerate(self.nodes, start=1)
+            if node.geom >= 0
+        ]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import mujoco
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, path_reason, pulled_tendon
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
+from mjwrap.mjcf.inside import shares_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.tuples import read_tuple
@@ -23,9 +24,9 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
     muscle actuators that mjwrap cannot take over, or other actuators whose path it cannot, are left to MuJoCo and
     named in `native`.
     """
-    by_actuator, free = _read_tuples(model, transmission)
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
+    by_actuator, free = _read_tuples(model, rest, transmission)
     muscles: list[MuscleDeclaration] = []
     native: dict[str, str] = {}
     for actuator in range(model.nactuator):
@@ -34,9 +35,12 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
         elif is_muscle(model, actuator) or (transmission and pulled_tendon(model, actuator) >= 0):
             reason = (path_reason if transmission else native_reason)(model, rest, actuator)
             if reason is None:
-                muscles.append(_read_native(model, actuator, transmission))
+                muscles.append(_read_native(model, rest, actuator, transmission))
             else:
                 native[name_of(model, OBJ.mjOBJ_ACTUATOR, actuator)] = reason
+    for muscle, reason in _mostly_inside(model, [m for m in muscles if m.actuator not in by_actuator]):
+        muscles.remove(muscle)
+        native[muscle.name] = reason
     taken = [muscle.name for muscle in muscles]
     for muscle in free:
         if muscle.name in taken:
@@ -49,7 +53,7 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
 
 
 def _read_tuples(
-    model: mujoco.MjModel, transmission: bool
+    model: mujoco.MjModel, rest: mujoco.MjData, transmission: bool
 ) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
     """Return the muscles of all mjwrap tuples: by actuator, and those without one."""
     by_actuator: dict[int, MuscleDeclaration] = {}
@@ -59,7 +63,7 @@ def _read_tuples(
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
         if "mjwrap" not in tuple_name:
             continue
-        muscle = read_tuple(model, index, transmission)
+        muscle = read_tuple(model, rest, index, transmission)
         if muscle.actuator < 0:
             free.append(muscle)
         elif muscle.actuator in by_actuator:
@@ -73,12 +77,39 @@ def _read_tuples(
     return by_actuator, free
 
 
-def _read_native(model: mujoco.MjModel, actuator: int, transmission: bool) -> MuscleDeclaration:
+def _mostly_inside(
+    model: mujoco.MjModel, muscles: list[MuscleDeclaration]
+) -> list[tuple[MuscleDeclaration, str]]:
+    """Return the native muscles that would have no path at most poses, as an end is inside a geom, with the reason."""
+    pairs = [
+        (muscle, node.geom, site)
+        for muscle in muscles
+        for route in muscle.routes
+        for node, *ends in route.geom_ends()
+        for site in ends
+        if not node.inside
+    ]
+    found: dict[int, tuple[MuscleDeclaration, str]] = {}
+    shares = shares_inside(model, [(geom, site) for _, geom, site in pairs])
+    for (muscle, geom, site), share in zip(pairs, shares, strict=True):
+        if share > 0.5:
+            end, round_what = name_of(model, OBJ.mjOBJ_SITE, site), name_of(model, OBJ.mjOBJ_GEOM, geom)
+            reason = (
+                f"no path can go round geom '{round_what}' at {share:.0%} of poses in the joints' ranges: site '{end}' "
+                f"is inside it there"
+            )
+            found[muscle.actuator] = muscle, reason
+    return list(found.values())
+
+
+def _read_native(
+    model: mujoco.MjModel, rest: mujoco.MjData, actuator: int, transmission: bool
+) -> MuscleDeclaration:
     name, tendon = name_of(model, OBJ.mjOBJ_ACTUATOR, actuator), pulled_tendon(model, actuator)
     try:
         law = ActuatorForce() if transmission else mujoco_law(model, actuator)
     except ModelError as error:
         raise ModelError(f"muscle '{name}': {error}") from None
     return MuscleDeclaration(
-        name, build_routes(model, name, tendon_stops(model, tendon)), law, actuator, tendon
+        name, build_routes(model, name, tendon_stops(model, rest, tendon)), law, actuator, tendon
     )

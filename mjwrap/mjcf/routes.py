@@ -9,6 +9,7 @@ import mujoco
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.declarations import Node, Route
+from mjwrap.mjcf.inside import end_is_inside, is_beside, side_is_inside
 from mjwrap.mjcf.names import listed, name_of, names
 from mjwrap.mjcf.surfaces import read_surface, wrapping_geoms
 
@@ -18,13 +19,15 @@ OBJ = mujoco.mjtObj
 class Stop(NamedTuple):
     """One element of a list of stops: id of a site, geom, hint (a site) or sizes (a numeric), or a pulley's divisor.
 
-    finite: a cylinder geom is wrapped as long as it is drawn, not as an infinite one.
+    finite: a cylinder geom is wrapped as long as it is drawn, not as an infinite one. inside: the string is held to the
+    geom's solid.
     """
 
     kind: Literal["site", "geom", "hint", "sizes", "pulley"]
     index: int = -1
     divisor: float = 1.0
     finite: bool = False
+    inside: bool = False
 
 
 class _Place(NamedTuple):
@@ -33,12 +36,17 @@ class _Place(NamedTuple):
     site: int = -1
     geom: int = -1
     finite: bool = False
+    inside: bool = False
     hint: int = -1
     sizes: int = -1
 
 
-def tendon_stops(model: mujoco.MjModel, tendon: int) -> list[Stop]:
-    """Return the stops of a spatial tendon."""
+def tendon_stops(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Stop]:
+    """Return the stops of a spatial tendon. poses: any, with kinematics.
+
+    A string is held inside a geom if the side site is inside and stays there, or if one of its ends does: MuJoCo's is
+    straight then, and so is the shortest one that meets the solid.
+    """
     stops: list[Stop] = []
     first = int(model.tendon_adr[tendon])
     for w in range(first, first + int(model.tendon_num[tendon])):
@@ -51,7 +59,24 @@ def tendon_stops(model: mujoco.MjModel, tendon: int) -> list[Stop]:
             stops.append(Stop("geom", index))
             if parameter >= 0.0:
                 stops.append(Stop("hint", round(parameter)))
+    for geom, side, ends in geoms_of(stops):
+        place = stops[geom].index
+        held = side >= 0 and is_beside(model, place, side) and side_is_inside(model, poses, place, side)
+        for end in ends:
+            held = held or (is_beside(model, place, end) and end_is_inside(model, poses, place, end))
+        stops[geom] = stops[geom]._replace(inside=held)
     return stops
+
+
+def geoms_of(stops: list[Stop]) -> list[tuple[int, int, tuple[int, int]]]:
+    """Return of every geom its place among a tendon's stops, its side site or -1, and the sites at its ends."""
+    found: list[tuple[int, int, tuple[int, int]]] = []
+    for k, stop in enumerate(stops):
+        if stop.kind == "geom":
+            beside = stops[k + 1].kind == "hint"
+            after = stops[k + 2 if beside else k + 1]
+            found.append((k, stops[k + 1].index if beside else -1, (stops[k - 1].index, after.index)))
+    return found
 
 
 def build_routes(model: mujoco.MjModel, muscle: str, stops: Iterable[Stop]) -> tuple[Route, ...]:
@@ -76,7 +101,7 @@ def _build_route(model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: 
         if stop.kind == "site":
             places.append(_Place(site=stop.index))
         elif stop.kind == "geom":
-            places.append(_Place(geom=stop.index, finite=stop.finite))
+            places.append(_Place(geom=stop.index, finite=stop.finite, inside=stop.inside))
         else:
             places[-1:] = [_completed(model, muscle, places[-1] if places else None, stop)]
     if len(places) < 2 or places[0].site < 0 or places[-1].site < 0:
@@ -113,7 +138,7 @@ def _node(model: mujoco.MjModel, muscle: str, place: _Place) -> Node:
         surface = read_surface(model, place.geom, place.sizes, place.finite)
     except ModelError as error:
         raise ModelError(f"muscle '{muscle}': {error}") from None
-    return Node(geom=place.geom, hint_site=place.hint, surface=surface)
+    return Node(geom=place.geom, hint_site=place.hint, surface=surface, inside=place.inside)
 
 
 def _describe(model: mujoco.MjModel, place: _Place) -> str:

@@ -43,10 +43,13 @@ class _Elements:
     texts: list[int] = field(default_factory=list)
 
 
-def read_tuple(model: mujoco.MjModel, index: int, transmission: bool = False) -> MuscleDeclaration:
+def read_tuple(
+    model: mujoco.MjModel, rest: mujoco.MjData, index: int, transmission: bool = False
+) -> MuscleDeclaration:
     """Return the muscle that a tuple declares; `ModelError` names the tuple or muscle and the element at fault.
 
-    transmission: for the law "mujoco" MuJoCo itself computes the force, of any actuator on a spatial tendon.
+    rest: kinematics of the reference pose. transmission: for the law "mujoco" MuJoCo itself computes the force, of any
+    actuator on a spatial tendon.
     """
     tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
     try:
@@ -69,7 +72,7 @@ def read_tuple(model: mujoco.MjModel, index: int, transmission: bool = False) ->
             raise ModelError(
                 f"tuple '{tuple_name}': it has neither sites of its own nor a tendon to take them from"
             )
-        stops = tendon_stops(model, tendon)
+        stops = tendon_stops(model, rest, tendon)
     routes = build_routes(model, name, stops)
     try:
         given = read_numerics(model, found.numerics)

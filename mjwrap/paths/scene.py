@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import chain, layout
-from mjwrap.surfaces import Surface
+from mjwrap.surfaces import Cylinder, Sphere, Surface
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -38,14 +38,17 @@ class Obstacle:
     """A wrapping surface at a pose in the world.
 
     surface: a `Surface`; pos (3,): origin of its frame [m]; quat (4,): w, x, y, z, any length but zero; hint (3,) or
-    None: a point in the surface's frame [m] near which the path should touch at a cold start. `GeometryError` for
-    anything else.
+    None: a point in the surface's frame [m] near which the path should touch at a cold start. inside: the path is not
+    kept out of the solid but held to it: the shortest one that meets it, with a corner at one point where the straight
+    line does not; only for a sphere or a cylinder of any length, between end points and via points. `GeometryError`
+    for anything else.
     """
 
     surface: Surface
     pos: tuple[float, ...] = (0.0, 0.0, 0.0)
     quat: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     hint: tuple[float, ...] | None = None
+    inside: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.surface, Surface):
@@ -56,6 +59,10 @@ class Obstacle:
             raise GeometryError("Obstacle: quat must not be zero")
         if self.hint is not None:
             object.__setattr__(self, "hint", vector(self.hint, 3, "Obstacle: hint"))
+        if self.inside and self.surface not in (Sphere(self.surface.size), Cylinder(self.surface.size)):
+            raise GeometryError(
+                f"Obstacle: only a Sphere or a Cylinder without ends can have inside=True, not {self.surface!r}"
+            )
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,16 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
     for k, obstacle in enumerate(obstacles):
         if not isinstance(obstacle, Obstacle | ViaPoint):
             raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")
+        after = obstacles[k + 1] if k + 1 < len(obstacles) else None
+        if (
+            isinstance(obstacle, Obstacle)
+            and isinstance(after, Obstacle)
+            and (obstacle.inside or after.inside)
+        ):
+            raise GeometryError(
+                f"obstacles[{k}] and obstacles[{k + 1}]: an obstacle with inside=True must stand between end points or "
+                f"via points"
+            )
     owner = owners(obstacles)
     node = np.zeros((len(owner), layout.ROW))
     node[:, layout.S_MODE] = layout.COLD
@@ -98,6 +115,7 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
         dims = obstacle.surface.dims
         node[row, layout.DIM : layout.DIM + len(dims)] = dims
         node[row, layout.SIZE] = obstacle.surface.size
+        node[row, layout.INSIDE] = float(obstacle.inside)
         chain.set_rotation(node, row, *obstacle.quat)
         if row > 0 and owner[row - 1] == k:
             node[row, layout.TWIN] = 1.0

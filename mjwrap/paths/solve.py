@@ -88,6 +88,10 @@ def _solve_with(
 
     if method not in methods.METHODS:
         raise GeometryError(f"method {method!r} is none of: newton, {', '.join(methods.METHODS)}")
+    if node[:, layout.INSIDE].any():
+        raise GeometryError(
+            f"method {method!r} finds no path that is held inside an obstacle; method 'newton' does"
+        )
     good, iterations, evaluations = True, 0, 0
     stops = [k for k, obstacle in enumerate(obstacles) if isinstance(obstacle, ViaPoint)] + [len(obstacles)]
     first, here = 0, np.array(origin)

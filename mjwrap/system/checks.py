@@ -25,15 +25,10 @@ def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDecla
     """Return which sites of a muscle lie inside the surfaces next to them at the given poses, or an empty string."""
     found = []
     for route in muscle.routes:
-        stops = [route.origin, *(node.site for node in route.nodes), route.insertion]
-        for place, node in enumerate(route.nodes, start=1):
-            if node.geom < 0:
+        for node, before, after in route.geom_ends():
+            if node.inside:
                 continue
-            beside = (
-                next(s for s in stops[place - 1 :: -1] if s >= 0),
-                next(s for s in stops[place:] if s >= 0),
-            )
-            for site in dict.fromkeys(beside):
+            for site in dict.fromkeys((before, after)):
                 local = poses.geom_xmat[node.geom].reshape(3, 3).T @ (
                     poses.site_xpos[site] - poses.geom_xpos[node.geom]
                 )

@@ -104,7 +104,7 @@ class Evaluator(Results):
             plan.source, plan.index, plan.control, plan.ctrl_low, plan.ctrl_high, plan.form, plan.times,
             self._disabled(), self._root,
             poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos,
-            data.act, data.ctrl, state.own, self._excitation, since, ahead, TOLERANCE,
+            data.act, data.ctrl, state.own, self._excitation, since, ahead, self.model.opt.timestep, TOLERANCE,
             state.node, state.segments, state.count, state.info,
             state.drive, state.start_activation, state.start_fiber, state.start_length,
             state.activation, state.fiber,

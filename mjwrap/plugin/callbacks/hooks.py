@@ -46,7 +46,7 @@ def _evaluation() -> tuple[Any, ...]:
         "i": types.int64[::1], "I": types.int64[:, ::1], "b": types.boolean[::1], "s": types.float64,
         "r": types.float64[::1], "R": types.float64[:, ::1],
     }  # fmt: skip
-    plan, poses, states = "IrIiRiiirriR" + "bi", "RRRRRR", "rrRr" + "sss"
+    plan, poses, states = "IrIiRiiirriR" + "bi", "RRRRRR", "rrRr" + "ssss"
     paths, results = "RRiR", "rrrr" + "rrrrrrr" + "iR"
     return tuple(kinds[letter] for letter in plan + poses + states + paths + results)
 

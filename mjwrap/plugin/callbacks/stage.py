@@ -13,7 +13,7 @@ from __future__ import annotations
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels import segments as sg
 from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, ROUTE, put, take_back
-from mjwrap.kernels.dynamics import write_states
+from mjwrap.kernels.dynamics import TIMES, write_states
 from mjwrap.kernels.evaluation import evaluate
 from mjwrap.kernels.muscle import PARAMS
 from mjwrap.plugin.callbacks import block as bk
@@ -219,7 +219,7 @@ def stage(block, model, data):
         _floats(block, bk.A_CTRL_LOW, (n,)),
         _floats(block, bk.A_CTRL_HIGH, (n,)),
         _ints(block, bk.A_FORM, (n,)),
-        _floats(block, bk.A_TIMES, (n, 3)),
+        _floats(block, bk.A_TIMES, (n, TIMES)),
         off,
         _ints(block, bk.A_BODY_ROOTID, (bodies,)),
         reals(word(data + word(block + 8 * bk.SITE_XPOS)), (word(block + 8 * bk.SITES), 3)),
@@ -234,6 +234,7 @@ def stage(block, model, data):
         _floats(block, bk.A_EXCITATION, (n,)),
         since,
         ahead,
+        step,
         TOLERANCE,
         _floats(block, bk.A_NODE, (nodes, lay.ROW)),
         _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),

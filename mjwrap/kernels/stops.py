@@ -1,0 +1,63 @@
+"""The rows of `stop` (rows of nodes + 2, STOP): the points that a path runs through, from origin to insertion.
+
+Nodes that are not touched have none. `derivatives.py` says what a row is for.
+"""
+
+from __future__ import annotations
+
+from mjwrap.kernels._jit import jit
+
+D_SLOT = 0
+D_TOUCHED = 1  # FIXED, TANGENT or CORNER
+D_P = 2  # P from the pose's origin (3) [m]
+D_Q = 5  # Q from the pose's origin (3) [m]
+D_E = 8  # unit vector of the segment that arrives (3)
+D_L = 11  # its length [m]
+D_NP = 12  # n_P, n_Q, b_P, b_Q (3 each), in the order of the node row
+D_NQ = 15
+D_BP = 18
+D_BQ = 21
+D_R = 24  # Jacobi field r at Q [m]
+D_KP = 25  # kappa, tau at P
+D_KQ = 27  # kappa, tau at Q
+D_COS = 29  # b_P . b_Q of the stop before
+D_FIELD = 30  # a + c r: the Jacobi field that the path before P allows
+D_PIVOT = 31  # 1 + c L of the segment that leaves
+D_C = 32  # stiffness c behind Q [1/m]
+D_U = 33  # difference of material velocities over the segment that arrives (3)
+D_GP = 36  # slope of the energy at P and at Q, the path before eliminated
+D_GQ = 37
+D_X = 38  # shift of P along b_P, of Q along b_Q
+D_Y = 39
+D_RATE = 40  # rate of e (3)
+D_ROW = 43  # of the node, from the chain's first one
+STOP = 44
+
+FIXED = 0.0  # origin, insertion, via point
+TANGENT = 1.0  # a contact that the path meets and leaves along the surface
+CORNER = (
+    2.0  # a string held inside (`inside.py`), between two fixed stops; it uses these columns differently:
+)
+D_T1 = D_BP  # the directions in which it can slide (3 each): round and along a cylinder's axis
+D_T2 = D_BQ
+D_BEND = D_KP  # curvature along them
+D_SLIDE = D_KQ  # how it slides (3); over D_KQ, D_COS
+
+
+@jit
+def dot(stop, i, left, j, right):
+    """Return the dot product of two column triples of two stops."""
+    return (
+        stop[i, left] * stop[j, right]
+        + stop[i, left + 1] * stop[j, right + 1]
+        + stop[i, left + 2] * stop[j, right + 2]
+    )
+
+
+@jit
+def spin(i, column, twist, stop):
+    """Return the angular velocity of stop i's body along the vector in `column`."""
+    k = int(stop[i, D_SLOT])
+    return (
+        twist[k, 3] * stop[i, column] + twist[k, 4] * stop[i, column + 1] + twist[k, 5] * stop[i, column + 2]
+    )
