@@ -25,6 +25,7 @@ from mjwrap.kernels.shape import turn_into_frame
 POS, S_P, W_P, W_Q, W_TP, W_TQ = lay.POS, lay.S_P, lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
 ENOUGH = 1e-28  # last step, squared, in radii and in the lengths of the segments
 LEAST = 1e-32  # as far as unit vectors can tell
+SMALL = 1e-3  # step [rad]
 ROUNDING = 4e-16  # of a height over the surface, in radii
 MOST = 60  # steps; four are normal, bisection alone takes fifty
 SHORT = 1e-4  # the angle of a shorter segment is judged as one of this length: rounding turns it [radii]
@@ -48,15 +49,20 @@ def _corner(ax, ay, bx, by):
     """
     reach_a, reach_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
     way = 1.0 if ax * by - ay * bx >= 0.0 else -1.0
-    lx, ly, hx, hy = ax / reach_a, ay / reach_a, bx / reach_b, by / reach_b
-    x, y = (reach_b - 1.0) * lx + (reach_a - 1.0) * hx, (reach_b - 1.0) * ly + (reach_a - 1.0) * hy
+    lx, ly, hx, hy = reach_b * ax, reach_b * ay, reach_a * bx, reach_a * by
+    x = (reach_b - 1.0) * ax + (reach_a - 1.0) * bx  # exact where A and B are close in direction
+    y = (reach_b - 1.0) * ay + (reach_a - 1.0) * by
     if x == 0.0 and y == 0.0:
         x, y = lx, ly
     least_a, least_b = 0.5 * (reach_a - 1.0) * (reach_a + 1.0), 0.5 * (reach_b - 1.0) * (reach_b + 1.0)
     steps = 0
+    turn = 1.0
     while True:
         steps += 1
-        over = 1.0 / math.sqrt(x * x + y * y)
+        if abs(turn) < SMALL:  # |P|^2 is 1 + turn^2: the root's series is exact to rounding
+            over = 1.0 - turn * turn * (0.5 - 0.375 * turn * turn)
+        else:
+            over = 1.0 / math.sqrt(x * x + y * y)
         x, y = x * over, y * over
         up_a, up_b = ax * x + ay * y - 1.0, bx * x + by * y - 1.0
         along_a, along_b = way * (ax * y - ay * x), way * (x * by - y * bx)
@@ -66,7 +72,8 @@ def _corner(ax, ay, bx, by):
             hx, hy = x, y
         else:
             lx, ly = x, y
-        if abs(sine) <= ROUNDING * reach_a * reach_b or steps == MOST:
+        noise = reach_b * (abs(along_a) + abs(up_a)) + reach_a * (abs(along_b) + abs(up_b))
+        if abs(sine) <= ROUNDING * noise or steps == MOST:
             break
         turn = 0.0
         rate_a, rate_b = 0.5 * square_a + least_a, 0.5 * square_b + least_b
@@ -80,7 +87,7 @@ def _corner(ax, ay, bx, by):
         if turn != 0.0 and way * (lx * ny - ly * nx) > 0.0 and way * (nx * hy - ny * hx) > 0.0:
             x, y = nx, ny
         else:
-            x, y = lx + hx, ly + hy
+            x, y, turn = lx + hx, ly + hy, 1.0
     size_a, size_b = math.sqrt(square_a), math.sqrt(square_b)
     error = abs(sine) / (max(size_a, SHORT) * max(size_b, SHORT))
     return x, y, size_a, size_b, error, steps
@@ -98,24 +105,34 @@ def _free(k, ax, ay, az, bx, by, bz, node):
 
 @jit
 def _touch(k, px, py, pz, length_a, length_b, ends, node):
-    """Write the corner P (in world directions from the surface's origin) and the directions of both segments."""
+    """Write the corner P, given in world directions from the surface's origin."""
     node[k, lay.S_MODE] = lay.TOUCHED
     for i in range(1, lay.STATE):
         node[k, lay.S_MODE + i] = 0.0
     node[k, S_P], node[k, S_P + 1], node[k, S_P + 2] = turn_into_frame(node, k, px, py, pz)
     node[k, lay.S_BEFORE], node[k, lay.S_BEFORE + 1] = length_a, length_b
+    x, y, z = px + node[k, POS] - ends[0], py + node[k, POS + 1] - ends[1], pz + node[k, POS + 2] - ends[2]
+    node[k, W_P], node[k, W_P + 1], node[k, W_P + 2] = x, y, z
+    node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2] = x, y, z
     least = ON_SURFACE * node[k, lay.SIZE]
+    if min(length_a, length_b) <= least:
+        _direct(k, px, py, pz, length_a > least, length_b > least, ends, node)
+
+
+@jit
+def _direct(k, px, py, pz, known_a, known_b, ends, node):
+    """Write the directions of both segments where one has no length: that which it has in the limit."""
     nx, ny, nz = normal(k, px, py, pz, node)
-    px, py, pz = px + node[k, POS] - ends[0], py + node[k, POS + 1] - ends[1], pz + node[k, POS + 2] - ends[2]
-    for column in (W_P, W_Q):
-        node[k, column], node[k, column + 1], node[k, column + 2] = px, py, pz
-    near, far = 1.0 / max(length_a, 1e-300), 1.0 / max(length_b, 1e-300)
-    ex, ey, ez = (px - ends[3]) * near, (py - ends[4]) * near, (pz - ends[5]) * near
-    gx, gy, gz = (ends[6] - px) * far, (ends[7] - py) * far, (ends[8] - pz) * far
-    if length_a <= least < length_b:  # what has no length has the direction that it has in the limit
+    x, y, z = node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]
+    ex, ey, ez = x - ends[3], y - ends[4], z - ends[5]
+    gx, gy, gz = ends[6] - x, ends[7] - y, ends[8] - z
+    near = 1.0 / max(math.sqrt(ex * ex + ey * ey + ez * ez), 1e-300)
+    far = 1.0 / max(math.sqrt(gx * gx + gy * gy + gz * gz), 1e-300)
+    ex, ey, ez, gx, gy, gz = ex * near, ey * near, ez * near, gx * far, gy * far, gz * far
+    if known_b and not known_a:
         up = 2.0 * (gx * nx + gy * ny + gz * nz)
         ex, ey, ez = gx - up * nx, gy - up * ny, gz - up * nz
-    elif length_b <= least < length_a:
+    elif known_a and not known_b:
         up = 2.0 * (ex * nx + ey * ny + ez * nz)
         gx, gy, gz = ex - up * nx, ey - up * ny, ez - up * nz
     node[k, W_TP], node[k, W_TP + 1], node[k, W_TP + 2] = ex, ey, ez
