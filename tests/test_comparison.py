@@ -17,6 +17,7 @@ from mjwrap.comparison import (
     verdict,
     with_native_laws,
 )
+from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.tendons import WrapRecord, tendon_spans
 from mjwrap.comparison.twins import Comparer
 from mjwrap.continuity import refine_jump
@@ -124,6 +125,25 @@ def test_the_long_way_round_a_sphere_is_put_to_mujoco() -> None:
     assert abs(jump.length) == pytest.approx(0.00119, abs=1e-5)
     without = compare_poses(load(BALL.format(side="")), samples=101)
     assert only(without)[0] == "both"
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+def test_a_string_held_inside_is_judged_as_the_shortest_that_meets_the_solid(kind: str) -> None:
+    """MuJoCo's corner is where its Newton's method stopped; the string is taken through the solid and beside it."""
+    text = BALL.format(side='sidesite="side"').replace('"0 0 .05"', '"0 0 .01"').replace("sphere", kind)
+    model = load(
+        text.replace('size=".03"', 'size=".03 .1" euler="90 0 0"').replace('"-.1 0 .01"', '"-.1 0 .03"')
+    )
+    found = compare_poses(model, samples=201)
+    (summary,) = found.muscles.values()
+    assert set(summary.counts) <= {"AGREE", "MUJOCO_NOT_GEODESIC"}
+    assert summary.counts["AGREE"] > summary.poses / 2
+    assert (summary.agreement < 1e-9).all()
+    assert {fault for fault, _ in summary.faults} <= {Fault.UNEVEN}
+    assert max(summary.measures.values(), default=0.0) < 2e-6
+    assert summary.length.difference < 1e-12
+    assert found.jumps == []
+    assert only(found)[0] in ("both", "mjwrap")
 
 
 def test_a_route_with_pulleys_is_read_as_mujoco_walks_it() -> None:

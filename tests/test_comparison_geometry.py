@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scenes import rotation
 
-from mjwrap.comparison.geometry import Fault, Judgement, closed_form_length, judge
+from mjwrap.comparison.geometry import Fault, Judgement, closed_form_length, judge, judge_held
 
 Array = np.ndarray
 
@@ -170,6 +171,40 @@ def test_a_path_inside_a_surface_has_one_contact_point_and_a_corner() -> None:
     a, b, touch = np.array([0.005, 0.0, 0.1]), np.array([0.005, 0.0, -0.1]), np.array([0.02, 0.0, 0.0])
     found = Path(True, 0.02, a, b, touch, touch, 0.0, 0.0).judged()
     assert found.fault[0] == Fault.INSIDE
+
+
+@pytest.mark.parametrize("cylinder", [True, False])
+def test_a_held_path_is_right_only_where_it_is_shortest(cylinder: bool) -> None:
+    """Reflected at the surface by construction; then each way of spoiling it is told from the others."""
+    rng = np.random.default_rng(9)
+    for _ in range(100):
+        radius, angle = rng.uniform(0.01, 0.1), rng.uniform(-3, 3)
+        n = np.array([np.cos(angle), np.sin(angle), 0.0])
+        along = np.array([-n[1], n[0], rng.uniform(-1, 1)])
+        depth = rng.uniform(0.1, 2.0)
+        p = radius * n + (np.array([0.0, 0.0, 0.3]) if cylinder else 0.0)
+        if not cylinder:
+            turn = rotation(rng.normal(size=4))
+            n, along, p = turn @ n, turn @ along, turn @ p
+        a, b = (
+            p + rng.uniform(0.05, 0.3) * (depth * n - along),
+            p + rng.uniform(0.05, 0.3) * (depth * n + along),
+        )
+        yes, no = np.array([True]), np.array([False])
+
+        def fault(a: Array, b: Array, touched: Array, p: Array, q: Array, radius: float = radius) -> Fault:
+            return Fault(
+                int(judge_held(cylinder, radius, a[None], b[None], touched, p[None], q[None]).fault[0])
+            )
+
+        assert fault(a, b, yes, p, p) == Fault.NONE
+        assert fault(a, b, no, p, p) == Fault.BESIDE
+        assert fault(a, b, yes, (1 + 1e-6) * p, (1 + 1e-6) * p) == Fault.OFF_SURFACE
+        assert fault(a, b, yes, p, p + 1e-6) == Fault.OFF_SURFACE
+        assert fault(a, b + 1e-6 * along, yes, p, p) == Fault.UNEVEN
+        assert fault(a, b + 1e-6 * n, yes, p, p) == Fault.UNEVEN
+        assert fault(2 * p - a, 2 * p - b, yes, p, p) == Fault.UNEVEN  # from within
+        assert fault(a, 0.5 * p, no, p, p) == Fault.NONE  # an end inside
 
 
 def test_turn_tells_windings_apart() -> None:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from declared_models import ARM, EXTENSOR, MUSCLE, tendon_jacobian
+from mjcf_reading import Vector
 from native_twins import EXPLICIT
 
 import mjwrap as mw
@@ -103,6 +104,30 @@ def test_path_and_force_are_mujocos(route: str, actuator: str) -> None:
         )
     assert len(touched) > 1 or "end" in route
     assert np.ptp(forces) > 10.0
+
+
+def test_the_jacobian_of_a_held_string_changes_as_its_rate_says() -> None:
+    """Against central quotients, whose error falls at second order, at poses where both corners are there."""
+    model = mujoco.MjModel.from_xml_string(xml("inside both", "plain"))
+    data, muscles = mujoco.MjData(model), mw.MuscleSystem(model)
+    rng = np.random.default_rng(72)
+    ratios = []
+    while len(ratios) < 50:
+        qpos, direction = rng.uniform((-0.6, -0.4), (2.2, 1.2)), rng.normal(size=2)
+
+        def jacobian(step: float, qpos: Vector = qpos, direction: Vector = direction) -> Vector:
+            data.qpos[:] = qpos + step * direction
+            return muscles.length_jacobian(data)
+
+        if any(jacobian(step) is None or len(muscles.contact_points(0)) < 2 for step in (-0.01, 0.0, 0.01)):
+            continue
+        data.qpos[:], data.qvel[:] = qpos, direction
+        exact = muscles.length_jacobian_rate(data)
+        errors = [np.abs((jacobian(h) - jacobian(-h)) / (2 * h) - exact).max() for h in (1e-3, 5e-4)]
+        assert errors[1] < 1e-5
+        assert errors[1] <= errors[0] / 3 + 1e-11
+        ratios.append(errors[0] / errors[1])
+    assert np.median(ratios) == pytest.approx(4.0, abs=0.05)
 
 
 @pytest.mark.parametrize("integrator", EXPLICIT)

@@ -37,6 +37,9 @@ SCENES = {
     "elbow": ELBOW.read_text(),
     "arm": ARM.format(tendon=EXTENSOR, actuator=MUSCLE, custom="", option=""),
     "elastic arm": elastic_arm(),
+    "held inside": ARM.replace(
+        'name="elbow_side" pos="-0.05 0 0"', 'name="elbow_side" pos="-0.005 0 0"'
+    ).format(tendon=EXTENSOR, actuator=MUSCLE, custom="", option=""),
     "lost paths": test_path_failures.SCENE,  # a muscle that has no path for some of the time
 }
 
