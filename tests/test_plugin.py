@@ -17,7 +17,7 @@ from mujoco import batch, rollout
 from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, native_spec, start
 
 import mjwrap as mw
-from mjwrap.plugin import excitations, install, load, read
+from mjwrap.plugin import excitations, install, load, native, read
 
 ROOT = Path(__file__).resolve().parent.parent
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -112,6 +112,23 @@ def test_mj_step_moves_as_the_native_twin_does(integrator: int) -> None:
         mujoco.mj_step(native, twin)
     np.testing.assert_allclose(data.qpos, twin.qpos, rtol=0.0, atol=1e-12)  # rounding over 500 steps
     np.testing.assert_allclose(data.qvel, twin.qvel, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_what_stays_native_is_named_and_pulls_on(keep: bool) -> None:
+    joint = '<muscle name="joint" joint="elbow" force="5" lengthrange="-1 1"/>'
+    spec = spec_of(ARM.format(tendon=EXTENSOR, actuator=MUSCLE + joint, custom="", option=""))
+    expected = mw.MuscleSystem(spec.compile()).native
+    model = install(spec, keep_tendons=keep)
+    before = model.actuator_forcerange.copy(), model.tendon_num.copy()
+    assert native(model) == expected == {"joint": "it does not pull a tendon"}
+    assert np.array_equal(model.actuator_forcerange, before[0])
+    assert np.array_equal(model.tendon_num, before[1])
+    data = mujoco.MjData(model)
+    data.act[:] = 1.0
+    mujoco.mj_forward(model, data)
+    assert read(data).names == ["extensor"]
+    assert data.actuator_force[1] < -1.0
 
 
 def test_runge_kutta_keeps_its_fourth_order() -> None:

@@ -19,6 +19,7 @@ Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
 ANGLE = 1e-9  # [rad] largest corner; both programs' contact points are closed-form or polished to 1e-10
+HELD = 2e-6  # [rad] the same of MuJoCo's corner inside a geom, which it finds to 1e-6 rad
 DEPTH = 1e-12  # [radii] deepest that a straight segment may pass below a surface, for rounding alone
 
 
@@ -123,12 +124,19 @@ def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: 
 
 
 def judge_held(
-    cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array
+    cylinder: bool,
+    radius: float,
+    a: Array,
+    b: Array,
+    touched: Flags,
+    p: Array,
+    q: Array,
+    angle: float = ANGLE,
 ) -> Judgement:
     """Judge paths that are held inside: the shortest from a to b that meet the solid; p = q where `touched`.
 
-    Straight through it, or with one corner on it where both segments, outside, make the same angle with the normal:
-    the problem is convex, so that is enough.
+    angle [rad]: by how much the angles at the corner may differ. Straight through it, or with one corner on it where
+    both segments, outside, make the same angle with the normal: the problem is convex, so that is enough.
     """
     zeros = np.zeros(len(a))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -145,7 +153,7 @@ def judge_held(
         fault, measure = zeros, zeros
         for here, name, size in (  # the last that holds is the one that is told
             (~touched & (beside > DEPTH * radius), Fault.BESIDE, beside),
-            (touched & (uneven > ANGLE + 10.0 * rounding), Fault.UNEVEN, uneven),
+            (touched & (uneven > angle + 10.0 * rounding), Fault.UNEVEN, uneven),
             (touched & (off > ANGLE * radius), Fault.OFF_SURFACE, off),
             (
                 ~np.isfinite(a + b + np.where(touched[:, None], p + q, 0.0)).all(axis=1),

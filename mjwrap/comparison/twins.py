@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.geometry import Fault, judge, judge_held
+from mjwrap.comparison.geometry import ANGLE, HELD, Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
 from mjwrap.poses import Motion
 from mjwrap.system import MuscleSystem
@@ -141,12 +141,15 @@ class Comparer:
         batch = Batch(motion)
         for name, index, tendon, spans in self._pairs:
             points = wraps.points(tendon, spans)
-            record = self._record(spans, points, geoms, *native.of(tendon))
+            record = self._record(spans, points, geoms, HELD, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)
             if index >= 0:
                 own = [_own_points(at) for at in points]
                 _assign(spans, own, [contact[index] for contact in contacts], self.model, geoms)
-                own_record, status = self._record(spans, own, geoms, *mine.of(index)), mine.status[:, index]
+                own_record, status = (
+                    self._record(spans, own, geoms, ANGLE, *mine.of(index)),
+                    mine.status[:, index],
+                )
             batch.twins.append(Twin(name, index, tendon, spans, record, own_record, status))
         return batch
 
@@ -179,7 +182,7 @@ class Comparer:
         return muscles.length.copy(), muscles.velocity.copy(), jacobian, muscles.status.copy()
 
     def _record(
-        self, spans: list[Span], points: list[SpanPoints], geoms: _Frames,
+        self, spans: list[Span], points: list[SpanPoints], geoms: _Frames, angle: float,
         length: Array, velocity: Array, jacobian: Array,
     ) -> PathRecord:  # fmt: skip
         count = len(length)
@@ -194,7 +197,8 @@ class Comparer:
             )
             arc = np.zeros(count)
             if span.geom >= 0:
-                found = (judge_held if span.inside else judge)(*_in_frame(self.model, span.geom, geoms, at))
+                local = _in_frame(self.model, span.geom, geoms, at)
+                found = judge_held(*local, angle) if span.inside else judge(*local)
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
                 if span.hint >= 0 and not span.inside:
                     side = geoms.local(span.geom, geoms.sites[:, span.hint])

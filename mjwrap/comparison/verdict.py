@@ -18,6 +18,7 @@ from mjwrap.poses import Motion
 
 Array = NDArray[np.float64]
 AGREE = 1e-9  # [m, m/s, m/rad] two true geodesics on one branch agree to this
+HELD = 1e-6  # [m, m/s, m/rad] the same where a string is held inside: MuJoCo finds its corner to 1e-6 rad
 
 
 class Outcome(enum.IntEnum):
@@ -44,7 +45,8 @@ def outcomes(twin: Twin, continuous: bool) -> NDArray[np.int64]:
     assert mine is not None
     count = len(native.length)
     same = (np.abs(native.turns - mine.turns) < 1e-3).all(axis=1)
-    near = differences(native, mine).max(axis=0) <= AGREE
+    held = (native.touched & [span.inside for span in twin.spans]).any(axis=1)
+    near = differences(native, mine).max(axis=0) <= np.where(held, HELD, AGREE)
     found = np.full(count, Outcome.UNEXPLAINED, dtype=np.int64)
     for here, outcome in (  # the last that holds counts
         (near & same, Outcome.AGREE),
