@@ -93,7 +93,10 @@ def test_path_and_force_are_mujocos(route: str, actuator: str) -> None:
         assert jacobian == pytest.approx(tendon_jacobian(native, twin), abs=arm)
         rel = 1e-4 if holds(route) else 1e-10  # the force-velocity curve is steep: 1e-6 m/s in 0.1 m/s
         assert muscles.tension == pytest.approx(-gear * twin.actuator_force, rel=rel, abs=1e-9)
-        touched.add(len(muscles.contact_points(0)))
+        contacts, drawn = muscles.contact_points(0), muscles.points(0)
+        touched.add(len(contacts))
+        for point in contacts.reshape(-1, 3):
+            assert np.linalg.norm(drawn - point, axis=1).min() < 1e-14
         forces.append(float(muscles.tension[0]))
         body, point, force = (np.array(x) for x in zip(*muscles.forces(0), strict=True))
         assert np.abs(force.sum(axis=0)).max() < 1e-13 * (1 + forces[-1])
@@ -149,3 +152,34 @@ def test_the_plugin_moves_the_model_as_mujoco_does(route: str, actuator: str, in
     assert np.abs(data.qpos - (1.0, 0.2)).max() > 0.05
     assert read(data).status == [0]
     np.testing.assert_allclose(data.act, twin.act, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.myo
+@pytest.mark.slow
+def test_the_arm_of_myo_sim_is_taken_over() -> None:
+    """All muscles but one, whose end is inside its cylinder at most poses; held ones agree with MuJoCo's."""
+    myo_sim = pytest.importorskip("myo_sim")
+    with pytest.warns(UserWarning, match="empty prefix"):
+        model, native = (myo_sim.load_model("myoarm_r") for _ in range(2))
+    data, twin, muscles = mujoco.MjData(model), mujoco.MjData(native), mw.MuscleSystem(model)
+    assert list(muscles.native) == ["RI2"]
+    held = [
+        i
+        for i, muscle in enumerate(muscles.declarations)
+        if any(node.inside for route in muscle.routes for node in route.nodes)
+    ]
+    assert len(held) == 20
+    tendons = [muscles.declarations[i].tendon for i in held]
+    low, high = model.jnt_range.T
+    rng = np.random.default_rng(73)
+    corners = np.zeros(len(held), dtype=bool)
+    for _ in range(40):
+        data.qpos[:] = twin.qpos[:] = rng.uniform(low, high)
+        mujoco.mj_fwdPosition(native, twin)
+        jacobian = muscles.length_jacobian(data)
+        assert not muscles.status[held].any()
+        assert muscles.length[held] == pytest.approx(twin.ten_length[tendons], abs=1e-13)
+        expected = tendon_jacobian(native, twin)[tendons]
+        assert jacobian[held] == pytest.approx(expected, abs=0.3 * CORNER)
+        corners |= [len(muscles.contact_points(i)) > 0 for i in held]
+    assert corners.sum() >= 17
