@@ -133,11 +133,14 @@ def test_the_jacobian_of_a_held_string_changes_as_its_rate_says() -> None:
     assert np.median(ratios) == pytest.approx(4.0, abs=0.05)
 
 
+@pytest.mark.parametrize("mode", ["wrench", "transmission"])
 @pytest.mark.parametrize("integrator", EXPLICIT)
 @pytest.mark.parametrize(("route", "actuator"), [*CASES, ("inside both", "early muscle")])
-def test_the_plugin_moves_the_model_as_mujoco_does(route: str, actuator: str, integrator: int) -> None:
+def test_the_plugin_moves_the_model_as_mujoco_does(
+    route: str, actuator: str, integrator: int, mode: str
+) -> None:
     native = mujoco.MjModel.from_xml_string(xml(route, actuator))
-    ours = install(mujoco.MjSpec.from_string(xml(route, actuator)))
+    ours = install(mujoco.MjSpec.from_string(xml(route, actuator)), mode)
     data, twin = mujoco.MjData(ours), mujoco.MjData(native)
     for model, start in ((ours, data), (native, twin)):
         model.opt.integrator = int(integrator)

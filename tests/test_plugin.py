@@ -114,12 +114,13 @@ def test_mj_step_moves_as_the_native_twin_does(integrator: int) -> None:
     np.testing.assert_allclose(data.qvel, twin.qvel, rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.parametrize("mode", ["wrench", "transmission"])
 @pytest.mark.parametrize("keep", [True, False])
-def test_what_stays_native_is_named_and_pulls_on(keep: bool) -> None:
+def test_what_stays_native_is_named_and_pulls_on(keep: bool, mode: str) -> None:
     joint = '<muscle name="joint" joint="elbow" force="5" lengthrange="-1 1"/>'
     spec = spec_of(ARM.format(tendon=EXTENSOR, actuator=MUSCLE + joint, custom="", option=""))
     expected = mw.MuscleSystem(spec.compile()).native
-    model = install(spec, keep_tendons=keep)
+    model = install(spec, mode, keep_tendons=keep)
     before = model.actuator_forcerange.copy(), model.tendon_num.copy()
     assert native(model) == expected == {"joint": "it does not pull a tendon"}
     assert np.array_equal(model.actuator_forcerange, before[0])

@@ -8,17 +8,23 @@ import mujoco
 
 from mjwrap.mjcf import read_declarations
 from mjwrap.plugin.placeholders import restore_placeholders
-from mjwrap.plugin.register import hush_to_silence
+from mjwrap.plugin.readout import instances
+from mjwrap.plugin.register import TRANSMISSION, claim_of, hush_to_silence
 from mjwrap.takeover import Takeover
 
 
 def native(model: mujoco.MjModel) -> dict[str, str]:
-    """Return the muscle actuators of a model that mjwrap cannot take over, by name, each with the reason.
+    """Return the actuators of an installed model that keep MuJoCo's own path, by name, each with the reason.
 
-    They pull along their own tendons, as without the plugin. The same as `MuscleSystem.native` before `install`.
+    Muscles, and in transmission mode all actuators on spatial tendons. `StateError` where there is no plugin.
     """
+    claims = [claim_of(model._address, instance) for instance in instances(model)]
     twin = copy.copy(model)
     hush_to_silence(twin)
     restore_placeholders(twin)
+    found: dict[str, str] = {}
     with Takeover(twin).suspended():
-        return read_declarations(twin).native
+        for mode in sorted({claim.mode for claim in claims}):
+            found |= read_declarations(twin, transmission=mode == TRANSMISSION).native
+    taken = {name for claim in claims for name in claim.muscles}
+    return {name: reason for name, reason in found.items() if name not in taken}

@@ -37,7 +37,8 @@ class Readout:
     transmitted: NDArray[np.bool_]  # pulled by MuJoCo's own actuator, whose force this tension is
 
 
-def _instances(model: mujoco.MjModel) -> list[int]:
+def instances(model: mujoco.MjModel) -> list[int]:
+    """Return the ids of mjwrap's instances in a model; `StateError` where there is none."""
     named = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
     found = [i for i, name in enumerate(named) if name.endswith(reg.INSTANCE)]
     if not found:
@@ -49,7 +50,7 @@ def read(data: mujoco.MjData) -> Readout:
     """Return what the plugin computed last for `data`: in `mj_forward`, or in `mj_step` at the state it began with."""
     names: list[str] = []
     columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
-    for instance in _instances(data.model):
+    for instance in instances(data.model):
         names += reg.claim_of(data.model._address, instance).muscles
         block = int(np.asarray(data.plugin_data)[instance])
         head = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
@@ -81,7 +82,7 @@ def excitations(data: mujoco.MjData) -> dict[str, Array]:
     It counts where a muscle has no actuator, whose control is the excitation otherwise. A reset makes it zero.
     """
     model, found = data.model, {}
-    for instance in _instances(model):
+    for instance in instances(model):
         first = int(model.plugin_stateadr[instance]) + 3  # the clock, then activation and fibre length
         for m, name in enumerate(reg.claim_of(model._address, instance).muscles):
             found[name] = data.plugin_state[first + PER_MUSCLE * m :][:1]
