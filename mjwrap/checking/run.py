@@ -12,7 +12,7 @@ from mjwrap.checking.differences import Neighbourhood, extrapolated_error, order
 from mjwrap.checking.energy import check_energy
 from mjwrap.checking.forces import balance_check, look_at_forces, power_check, work_check
 from mjwrap.checking.outcome import Check, Checks
-from mjwrap.checking.sweeps import Paths, sweep_joint
+from mjwrap.checking.sweeps import Paths, Sweeper
 from mjwrap.errors import ModelError
 from mjwrap.poses import PoseMaker
 from mjwrap.system import MuscleSystem
@@ -69,9 +69,10 @@ def check_model(
     if found.size:
         arms.remarks.append(f"differences come to it at order {np.median(found):.2f} (second order is 2)")
     data.qvel[:] = 0.0
+    sweeper = Sweeper(muscles, data, paths, jumps)
     for k, (each, joint, axis) in enumerate(sweeps):
         tell("sweeps", poses + k, total)
-        sweep_joint(muscles, data, each, joint, axis, samples, paths, jumps)
+        sweeper.sweep(each, joint, axis, samples)
     tell("energy", total - 1, total)
     energy = check_energy(model, start)
     facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples}

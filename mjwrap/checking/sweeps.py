@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.checking.outcome import Check
-from mjwrap.continuity import NARROW, Probe, odd_intervals, refine_jump
+from mjwrap.continuity import NARROW, odd_intervals, refine_jump
 from mjwrap.paths import Status
 from mjwrap.poses import PoseMaker
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
+Place = Callable[[float], tuple[Array, Array]]  # where a joint is -> pose (nq,), its derivative (nv,)
+FINER = 64  # steps in an interval at which something may have jumped
 MODELS = (Status.ENDPOINT_INSIDE, Status.OUT_OF_RANGE)  # where the model is such that there is no path
 
 
@@ -53,66 +55,79 @@ class Paths:
         return [self.found, self.inside, self.tangency]
 
 
-def sweep_joint(
-    muscles: MuscleSystem, data: mujoco.MjData, maker: PoseMaker, joint: int, axis: int, samples: int, paths: Paths,
-    jumps: Check,
-) -> None:  # fmt: skip
-    """Sweep a joint, and look for jumps in the lengths and slopes of all muscles."""
-    motion = maker.sweep(joint, samples, axis)
-    length, slope = np.zeros((2, samples, muscles.n))
-    status = np.zeros((samples, muscles.n), dtype=np.int64)
-    muscles.reset(data)
-    branches = []
-    for k in range(samples):
-        data.qpos[:] = motion.qpos[k]
-        jacobian = muscles.length_jacobian(data)
-        length[k], slope[k], status[k] = muscles.length, jacobian @ motion.tangent[k], muscles.status
-        branches.append(muscles.branch(data))
-        paths.look(muscles, f"{motion.name} = {motion.at[k]:.4f}")
-    jumps.count += muscles.n
-    sweep = _Sweep(muscles, data, maker.maker(joint, axis), motion.at, branches)
-    for i, name in enumerate(muscles.names):
-        for found in _jumps(sweep, i, length[:, i], slope[:, i], status[:, i] == 0):
-            jumps.remarks.append(f"{name} at {motion.name} = {found}")
-            jumps.worst += 1.0
+class _Walk(NamedTuple):
+    """Places evaluated one after the other: at (T,), length, slope and good (T, n), and the branches there."""
 
-
-class _Sweep(NamedTuple):
-    """A sweep that has been evaluated: at (T,), and the branches at its samples."""
-
-    muscles: MuscleSystem
-    data: mujoco.MjData
-    place: Callable[[float], tuple[Array, Array]]
     at: Array
+    length: Array
+    slope: Array
+    good: NDArray[np.bool_]
     branches: list[Array]
 
-
-def _jumps(sweep: _Sweep, i: int, length: Array, slope: Array, good: NDArray[np.bool_]) -> list[str]:
-    """Say where muscle i jumps, by how much, and how many surfaces it touches before and after."""
-    span = float(np.ptp(sweep.at))
-    found: dict[float, str] = {}
-    for k, bend in odd_intervals(sweep.at, length, slope, good):
-        probe = _probe(sweep, k, i)
-        jump = refine_jump(probe, float(sweep.at[k]), float(sweep.at[k + 1]), span, bend)
-        if jump is None or any(abs(jump[0] - other) < 1e3 * NARROW * span for other in found):
-            continue
-        at, size, turn = jump
-        touched = []
-        for side in (-2.0 * NARROW * span, 2.0 * NARROW * span):
-            probe(at + side)
-            touched.append(len(sweep.muscles.contact_points(i)))
-        what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
-        found[at] = f"{at:.6f}: {what}; {touched[0]} surfaces touched, then {touched[1]}"
-    return list(found.values())
+    def odd(self, i: int) -> list[tuple[int, float | None]]:
+        """Return the intervals at which muscle i changes as a smooth curve would not."""
+        return odd_intervals(self.at, self.length[:, i], self.slope[:, i], self.good[:, i])
 
 
-def _probe(sweep: _Sweep, k: int, i: int) -> Probe:
-    """Return a probe that comes to every place from the branch at sample k."""
+class Sweeper:
+    """Sweeps one joint after the other, and finds jumps in the lengths and slopes of all muscles."""
 
-    def probe(at: float) -> tuple[float, float]:
-        sweep.data.qpos[:], tangent = sweep.place(at)
-        sweep.muscles.set_branch(sweep.data, sweep.branches[k])
-        jacobian = sweep.muscles.length_jacobian(sweep.data)
-        return float(sweep.muscles.length[i]), float(jacobian[i] @ tangent)
+    def __init__(self, muscles: MuscleSystem, data: mujoco.MjData, paths: Paths, jumps: Check) -> None:
+        self._muscles, self._data, self._paths, self._jumps = muscles, data, paths, jumps
 
-    return probe
+    def sweep(self, maker: PoseMaker, joint: int, axis: int, samples: int) -> None:
+        """Sweep a joint over its range."""
+        motion = maker.sweep(joint, samples, axis)
+        place, span = maker.maker(joint, axis), float(np.ptp(motion.at))
+        self._muscles.reset(self._data)
+        walk = self._walk(place, motion.at, motion.name)
+        self._jumps.count += self._muscles.n
+        odd = [{k for k, _ in walk.odd(i)} for i in range(self._muscles.n)]
+        found: list[tuple[int, float]] = []
+        for k in sorted(set().union(*odd)):
+            # in finer steps, as a smooth motion goes: a leap may land on another branch, where two lie side by side
+            self._muscles.set_branch(self._data, walk.branches[k])
+            fine = self._walk(place, np.linspace(walk.at[k], walk.at[k + 1], FINER + 1))
+            for i in (i for i, places in enumerate(odd) if k in places):
+                for jump in self._refine(place, fine, i, span):
+                    if all(i != other or abs(jump[0] - at) > 1e-6 * span for other, at in found):
+                        found.append((i, jump[0]))
+                        self._jumps.worst += 1.0
+                        self._jumps.remarks.append(f"{self._muscles.names[i]} at {motion.name} = {jump[1]}")
+
+    def _walk(self, place: Place, at: Array, name: str = "") -> _Walk:
+        """Evaluate places in order, each from the branch of the one before; a named walk counts among the poses."""
+        muscles, data, n = self._muscles, self._data, self._muscles.n
+        walk = _Walk(at, *np.zeros((2, len(at), n)), np.zeros((len(at), n), dtype=np.bool_), [])
+        for k, value in enumerate(at.tolist()):
+            data.qpos[:], tangent = place(value)
+            walk.slope[k] = muscles.length_jacobian(data) @ tangent
+            walk.length[k], walk.good[k] = muscles.length, muscles.status == 0
+            walk.branches.append(muscles.branch(data))
+            if name:
+                self._paths.look(muscles, f"{name} = {value:.4f}")
+        return walk
+
+    def _refine(self, place: Place, walk: _Walk, i: int, span: float) -> list[tuple[float, str]]:
+        """Return where muscle i jumps, and by how much and how many surfaces it touches before and after."""
+        muscles, data = self._muscles, self._data
+        found: dict[float, str] = {}
+        for k, bend in walk.odd(i):
+
+            def probe(at: float, branch: Array = walk.branches[k]) -> tuple[float, float]:
+                data.qpos[:], tangent = place(at)
+                muscles.set_branch(data, branch)
+                jacobian = muscles.length_jacobian(data)
+                return float(muscles.length[i]), float(jacobian[i] @ tangent)
+
+            jump = refine_jump(probe, float(walk.at[k]), float(walk.at[k + 1]), span, bend)
+            if jump is None:
+                continue
+            at, size, turn = jump
+            touched = []
+            for side in (-2.0 * NARROW * span, 2.0 * NARROW * span):
+                probe(at + side)
+                touched.append(len(muscles.contact_points(i)))
+            what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
+            found[at] = f"{at:.6f}: {what}; {touched[0]} surfaces touched, then {touched[1]}"
+        return list(found.items())
