@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.checking.outcome import Check
+from mjwrap.mjcf import dof_names
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -28,32 +29,24 @@ def power_check() -> Check:
 
 
 def look_at_forces(
-    muscles: MuscleSystem,
-    data: mujoco.MjData,
-    jacobian: Array,
-    where: str,
-    checks: tuple[Check, Check, Check],
+    muscles: MuscleSystem, data: mujoco.MjData, where: str, checks: tuple[Check, Check, Check]
 ) -> None:
-    """Apply the muscles' forces at the state in `data`, whose ∂l/∂q is `jacobian` (n, nv), and compare."""
+    """Apply the muscles' forces at the state in `data`, from a cold start, and compare.
+
+    A muscle without a path there has no last good force to hold: it pulls nothing.
+    """
     work, balance, power = checks
     model = muscles.model
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     data.xfrc_applied[:] = 0.0
+    muscles.reset(data)
     muscles.apply(data)
-    tension, velocity, names = muscles.tension, muscles.velocity, muscles.names
+    tension, velocity, names, good = muscles.tension, muscles.velocity, muscles.names, muscles.status == 0
     found = np.zeros(model.nv)
     for body in np.flatnonzero(data.xfrc_applied.any(axis=1)):
         force, moment = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:]
         mujoco.mj_applyFT(model, data, force, moment, data.xipos[body], int(body), found)
-    good = muscles.status == 0
-    if good.all():
-        parts = np.abs(jacobian).T @ tension
-        scale = float(parts.max(initial=0.0))
-        if scale > 0.0:
-            gap = np.abs(found + jacobian.T @ tension)
-            dofs = [f"dof {i}" for i in range(model.nv)]
-            work.see(gap / np.maximum(parts, 1e-6 * scale), where, dofs)
     for i in np.flatnonzero(good & (tension > 0.0)):
         pulls = muscles.forces(int(i))
         points = np.array([point for _, point, _ in pulls])
@@ -68,7 +61,14 @@ def look_at_forces(
         each = np.einsum("kj,kj->k", forces, speeds)
         size = max(float(np.abs(each).sum()), 1e-9 * tension[i])
         power.see(abs(float(each.sum()) + tension[i] * velocity[i]) / size, where, [names[i]])
-    muscles.reset(data)
+    muscles.reset(data)  # takes the forces out again
+    jacobian = muscles.length_jacobian(data)
+    pull = np.where(good, tension, 0.0)
+    parts = np.abs(jacobian).T @ pull
+    scale = float(parts.max(initial=0.0))
+    if scale > 0.0:
+        gap = np.abs(found + jacobian.T @ pull)
+        work.see(gap / np.maximum(parts, 1e-6 * scale), where, dof_names(model))
 
 
 def _speed(model: mujoco.MjModel, data: mujoco.MjData, body: int, point: Array) -> Array:

@@ -14,6 +14,7 @@ from mjwrap.checking.forces import balance_check, look_at_forces, power_check, w
 from mjwrap.checking.outcome import Check, Checks
 from mjwrap.checking.sweeps import Paths, Sweeper
 from mjwrap.errors import ModelError
+from mjwrap.mjcf import dof_names
 from mjwrap.poses import PoseMaker
 from mjwrap.system import MuscleSystem
 
@@ -64,7 +65,7 @@ def check_model(
         muscles.excitation = rng.uniform(0.1, 1.0, muscles.n)
         muscles.reset(data)
         measured.append(_derivatives(muscles, data, where, speed, arms, paths))
-        look_at_forces(muscles, data, muscles.length_jacobian(data), where, forces)
+        look_at_forces(muscles, data, where, forces)
     found = np.concatenate([np.empty(0), *measured])
     if found.size:
         arms.remarks.append(f"differences come to it at order {np.median(found):.2f} (second order is 2)")
@@ -92,9 +93,9 @@ def _derivatives(
     full = np.maximum(np.abs(jacobian) @ np.abs(data.qvel), 1e-3 * length)
     speed.see(extrapolated_error(around.central(data.qvel.copy()), velocity) / full, where, muscles.names)
     found = []
-    for d in range(model.nv):
+    for d, dof in enumerate(dof_names(model)):
         central = around.central(np.eye(model.nv)[d])
         error = extrapolated_error(central, jacobian[:, d]) / size
-        arms.see(error, f"dof {d}, {where}", muscles.names)
+        arms.see(error, f"{dof}, {where}", muscles.names)
         found.append(orders(central, jacobian[:, d], size))
     return np.concatenate([np.empty(0), *found])

@@ -98,15 +98,20 @@ class Sweeper:
     def _walk(self, place: Place, at: Array, name: str = "") -> _Walk:
         """Evaluate places in order, each from the branch of the one before; a named walk counts among the poses."""
         muscles, data, n = self._muscles, self._data, self._muscles.n
-        walk = _Walk(at, *np.zeros((2, len(at), n)), np.zeros((len(at), n), dtype=np.bool_), [])
+        length, slope, good = (
+            np.zeros((len(at), n)),
+            np.zeros((len(at), n)),
+            np.zeros((len(at), n), dtype=np.bool_),
+        )
+        branches: list[Array] = []
         for k, value in enumerate(at.tolist()):
             data.qpos[:], tangent = place(value)
-            walk.slope[k] = muscles.length_jacobian(data) @ tangent
-            walk.length[k], walk.good[k] = muscles.length, muscles.status == 0
-            walk.branches.append(muscles.branch(data))
+            slope[k] = muscles.length_jacobian(data) @ tangent
+            length[k], good[k] = muscles.length, muscles.status == 0
+            branches.append(muscles.branch(data))
             if name:
                 self._paths.look(muscles, f"{name} = {value:.4f}")
-        return walk
+        return _Walk(at, length, slope, good, branches)
 
     def _refine(self, place: Place, walk: _Walk, i: int, span: float) -> list[tuple[float, str]]:
         """Return where muscle i jumps, and by how much and how many surfaces it touches before and after."""

@@ -15,7 +15,7 @@ from mjwrap.cli.output import Output
 from mjwrap.excitation import control_names
 from mjwrap.files import RowWriter
 from mjwrap.files.writing import save_npz
-from mjwrap.mjcf import MuscleDeclaration, name_of
+from mjwrap.mjcf import MuscleDeclaration, act_names, dof_names, qpos_names
 
 Array = NDArray[np.float64]
 MUSCLE_KINDS = ("activation", "fiber_length", "length", "velocity", "tension")
@@ -88,35 +88,6 @@ def _chain(model: mujoco.MjModel, body: int) -> set[int]:
         found |= set(range(first, first + int(model.body_dofnum[body])))
         body = int(model.body_parentid[body])
     return found
-
-
-def qpos_names(model: mujoco.MjModel) -> list[str]:
-    """Return a name for every entry of qpos: its joint's, with a number where the joint has several."""
-    return _joint_names(model, model.jnt_qposadr, model.nq)
-
-
-def dof_names(model: mujoco.MjModel) -> list[str]:
-    """Return a name for every entry of qvel, as `qpos_names` does."""
-    return _joint_names(model, model.jnt_dofadr, model.nv)
-
-
-def _joint_names(model: mujoco.MjModel, starts: NDArray[np.int32], total: int) -> list[str]:
-    ends = [*starts.tolist()[1:], total]
-    joints = (name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt))
-    pairs = zip(joints, starts.tolist(), ends, strict=True)
-    return [each for name, first, last in pairs for each in _numbered(name, last - first)]
-
-
-def act_names(model: mujoco.MjModel) -> list[str]:
-    """Return a name for every entry of act: its actuator's, with a number where the actuator has several."""
-    found: list[str] = []
-    for i in range(model.nactuator):
-        found += _numbered(name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i), int(model.actuator_actnum[i]))
-    return found
-
-
-def _numbered(name: str, count: int) -> list[str]:
-    return [name] if count == 1 else [f"{name}[{i}]" for i in range(count)]
 
 
 class Samples:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from mjwrap import MuscleSystem, Table
 from mjwrap.cli.errors import UserError
 from mjwrap.cli.models import single_joints
-from mjwrap.cli.samples import KINDS, act_names, dof_names, qpos_names
+from mjwrap.cli.samples import KINDS
 from mjwrap.excitation import control_names
+from mjwrap.mjcf import act_names, dof_names, qpos_names
 
 Array = NDArray[np.float64]
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)

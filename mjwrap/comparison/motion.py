@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import MjwrapError
 from mjwrap.excitation import Excitation
-from mjwrap.mjcf import name_of
+from mjwrap.mjcf import dof_names, name_of
 from mjwrap.system import MuscleSystem
 from mjwrap.takeover import Takeover
 
@@ -147,18 +147,3 @@ def compare_motion(
 
 def _places(model: mujoco.MjModel) -> list[int]:
     return [int(model.jnt_qposadr[int(model.dof_jntid[d])]) for d in range(model.nv)]
-
-
-def dof_names(model: mujoco.MjModel) -> list[str]:
-    """Return a name for every degree of freedom: its joint's, with a number where the joint has several."""
-    found = []
-    for d in range(model.nv):
-        joint = int(model.dof_jntid[d])
-        name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
-        first = int(model.jnt_dofadr[joint])
-        several = int(model.jnt_type[joint]) in (
-            int(mujoco.mjtJoint.mjJNT_FREE),
-            int(mujoco.mjtJoint.mjJNT_BALL),
-        )
-        found.append(f"{name}[{d - first}]" if several else name)
-    return found

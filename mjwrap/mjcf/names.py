@@ -28,3 +28,32 @@ def has_plugin(model: mujoco.MjModel) -> bool:
     """Return whether mjwrap's engine plugin drives the muscles of a model."""
     kind = mujoco.mjtObj.mjOBJ_PLUGIN
     return any(name_of(model, kind, i).endswith(PLUGIN_INSTANCE) for i in range(model.nplugin))
+
+
+def qpos_names(model: mujoco.MjModel) -> list[str]:
+    """Return a name for every entry of qpos: its joint's, with a number where the joint has several."""
+    return _joint_names(model, model.jnt_qposadr.tolist(), model.nq)
+
+
+def dof_names(model: mujoco.MjModel) -> list[str]:
+    """Return a name for every entry of qvel, as `qpos_names` does."""
+    return _joint_names(model, model.jnt_dofadr.tolist(), model.nv)
+
+
+def _joint_names(model: mujoco.MjModel, starts: list[int], total: int) -> list[str]:
+    ends = [*starts[1:], total]
+    joints = (name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt))
+    pairs = zip(joints, starts, ends, strict=True)
+    return [each for name, first, last in pairs for each in _numbered(name, last - first)]
+
+
+def act_names(model: mujoco.MjModel) -> list[str]:
+    """Return a name for every entry of act: its actuator's, with a number where the actuator has several."""
+    found: list[str] = []
+    for i in range(model.nactuator):
+        found += _numbered(name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i), int(model.actuator_actnum[i]))
+    return found
+
+
+def _numbered(name: str, count: int) -> list[str]:
+    return [name] if count == 1 else [f"{name}[{i}]" for i in range(count)]
