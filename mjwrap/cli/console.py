@@ -62,6 +62,9 @@ def run(name: str, body: Callable[[], int]) -> int:
     except MemoryError:
         return _say(name, "out of memory", RUN_FAILED)
     except KeyboardInterrupt:
+        # Where it came up inside an exec or eval (numba has some), `python -m` would end by the signal, whatever
+        # the exit code; the next exec makes it forget that.
+        exec("")
         return _say(name, "stopped by Ctrl-C", INTERRUPTED)
     except BrokenPipeError:  # whoever reads standard output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
