@@ -46,8 +46,8 @@ def failed_when(monkeypatch: pytest.MonkeyPatch, name: str, spoil: Callable[[Any
         ("forces", lambda pulls: pulls[:-1], {"balance"}),
         ("forces", lambda pulls: [(b, p, 1.001 * f) for b, p, f in pulls], {"power"}),
         ("tangency_error", lambda e: e + 2e-10, {"tangency"}),
-        ("status", lambda s: s + 1, {"paths"}),
-        ("status", lambda s: s + int(mw.Status.ENDPOINT_INSIDE), {"model"}),
+        ("status", lambda s: s + 1, {"paths", "virtual_work"}),
+        ("status", lambda s: s + int(mw.Status.ENDPOINT_INSIDE), {"model", "virtual_work"}),
     ],
 )
 def test_a_broken_law_is_noticed(

@@ -390,17 +390,19 @@ def test_moment_arms_that_are_left_out_are_zero() -> None:
 def test_the_plugin_moves_the_model_to_the_same_places(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tables = []
-    for mode in ("python", "wrench"):
+    tables = {}
+    for mode in ("python", "wrench", "transmission"):
         path = tmp_path / f"{mode}.npz"
         options = ["--excitation", "random:2", "--integrator", "rk4", "--duration", 0.2, "--out", path]
         ran = simulate(capsys, ELBOW, "--mode", mode, *options)
         assert ran.code == 0, ran.err
-        tables.append(mw.read_table(path))
-    assert tables[0].names == tables[1].names
-    assert np.array_equal(tables[0].time, tables[1].time)
-    assert np.abs(tables[0].values - tables[1].values).max() < 1e-9
-    assert np.array_equal(tables[0]["qpos:elbow_flexion"], tables[1]["qpos:elbow_flexion"])
+        tables[mode] = mw.read_table(path)
+    first = tables["python"]
+    for table in tables.values():
+        assert table.names == first.names
+        assert np.array_equal(table.time, first.time)
+        assert np.abs(table.values - first.values).max() < 1e-9
+    assert np.array_equal(tables["wrench"]["qpos:elbow_flexion"], first["qpos:elbow_flexion"])
 
 
 def test_the_plugin_drives_muscles_without_an_actuator(

@@ -43,10 +43,12 @@ def look_at_forces(
     muscles.reset(data)
     muscles.apply(data)
     tension, velocity, names, good = muscles.tension, muscles.velocity, muscles.names, muscles.status == 0
-    found = np.zeros(model.nv)
+    found, parts = np.zeros(model.nv), np.zeros(model.nv)
     for body in np.flatnonzero(data.xfrc_applied.any(axis=1)):
-        force, moment = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:]
-        mujoco.mj_applyFT(model, data, force, moment, data.xipos[body], int(body), found)
+        force, moment, each = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:], np.zeros(model.nv)
+        mujoco.mj_applyFT(model, data, force, moment, data.xipos[body], int(body), each)
+        found += each
+        parts += np.abs(each)
     for i in np.flatnonzero(good & (tension > 0.0)):
         pulls = muscles.forces(int(i))
         points = np.array([point for _, point, _ in pulls])
@@ -64,7 +66,6 @@ def look_at_forces(
     muscles.reset(data)  # takes the forces out again
     jacobian = muscles.length_jacobian(data)
     pull = np.where(good, tension, 0.0)
-    parts = np.abs(jacobian).T @ pull
     scale = float(parts.max(initial=0.0))
     if scale > 0.0:
         gap = np.abs(found + jacobian.T @ pull)

@@ -16,14 +16,14 @@ Exit code 1 where a law does not hold.
 from __future__ import annotations
 
 import argparse
-from typing import Any
+import contextlib
 
 from mjwrap.checking import check_model
 from mjwrap.cli.arguments import at_least
 from mjwrap.cli.errors import FAULTS
 from mjwrap.cli.models import load, start_keyframe, start_state
 from mjwrap.cli.output import Report, add_json
-from mjwrap.cli.progress import progress_bar
+from mjwrap.cli.progress import Stages
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,26 +42,15 @@ def execute(options: argparse.Namespace) -> int:
     model = load(options.model)
     base = start_state(model, start_keyframe(model, options.keyframe)).qpos
     report = Report(options.json)
-    bars: list[Any] = []
-
-    def advance(name: str, done: int, count: int) -> None:
-        if not bars:
-            bars.append(progress_bar(count, "steps", "checking"))
-        bars[0].set_description_str(name)
-        bars[0].update(int(done > 0))
-
-    try:
+    with contextlib.closing(Stages("steps", "checking")) as progress:
         found = check_model(
             model,
             poses=options.poses,
             samples=options.samples,
             base=base,
             seed=options.seed,
-            progress=advance,
+            progress=progress,
         )
-    finally:
-        for bar in bars:
-            bar.close()
     facts = found.facts
     muscles = f"{facts['muscles']} muscle{'s' * (facts['muscles'] != 1)}"
     sweeps = f"{facts['sweeps']} sweep{'s' * (facts['sweeps'] != 1)}"

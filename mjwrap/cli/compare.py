@@ -16,6 +16,7 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import contextlib
 import fnmatch
 import shlex
 from pathlib import Path
@@ -29,7 +30,7 @@ from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_pos
 from mjwrap.cli.errors import FAULTS, UserError
 from mjwrap.cli.models import load, start_keyframe, start_state
 from mjwrap.cli.output import Output, Report, add_json
-from mjwrap.cli.progress import need_matplotlib, progress_bar
+from mjwrap.cli.progress import Stages, need_matplotlib
 from mjwrap.cli.states import read_states
 from mjwrap.comparison import (
     PoseComparison,
@@ -178,22 +179,11 @@ def compare_all(
     rows: PoseTable | None,
 ) -> PoseComparison:  # fmt: skip
     """Compare at all poses, with a progress bar."""
-    bars: list[Any] = []
-
-    def advance(name: str, k: int, count: int) -> None:
-        if not bars:
-            bars.append(progress_bar(count, "motions", "comparing"))
-        bars[0].set_description_str(name)
-        bars[0].update(int(k > 0))
-
-    try:
+    with contextlib.closing(Stages("motions", "comparing")) as progress:
         return compare_poses(
             model, names=names, samples=options.samples, bases=options.bases, seed=options.seed,
-            base=start.qpos, each=rows.add if rows is not None else None, progress=advance,
+            base=start.qpos, each=rows.add if rows is not None else None, progress=progress,
         )  # fmt: skip
-    finally:
-        for bar in bars:
-            bar.close()
 
 
 def choose(muscles: MuscleSystem, wanted: list[str] | None) -> list[str] | None:

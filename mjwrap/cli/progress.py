@@ -40,11 +40,30 @@ def progress_bar(total: float, unit: str, label: str) -> Any:
     return _NoBar()
 
 
+class Stages:
+    """A bar for work that names its parts: called before each with (name, how many are done, of how many)."""
+
+    def __init__(self, unit: str, label: str) -> None:
+        self._unit, self._label = unit, label
+        self._bar: Any = None
+
+    def __call__(self, name: str, done: int, count: int) -> None:
+        if self._bar is None:
+            self._bar = progress_bar(count, self._unit, self._label)
+        self._bar.set_description_str(name, refresh=False)
+        self._bar.update(int(done > 0))
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.close()
+
+
 class _NoBar:
     def update(self, n: float) -> None:
         """Do nothing."""
 
-    def set_description_str(self, text: str) -> None:
+    def set_description_str(self, text: str, refresh: bool = True) -> None:
         """Do nothing."""
 
     def close(self) -> None:
