@@ -88,14 +88,14 @@ def test_fields_that_are_not_where_they_are_declared_are_refused(
 ) -> None:
     """Without one of its fields a struct shifts all that follow it, as an unknown version would."""
     declared = without(struct, field)
-    monkeypatch.setattr(off, "_structs", lambda: declared)
+    monkeypatch.setattr(off, "structs", lambda: declared)
     with pytest.raises(VersionError, match=r"MuJoCo .* is not where its declaration puts it"):
         off.offsets.__wrapped__()
 
 
 def test_a_missing_field_and_an_unknown_type_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     declared = without("mjData", "subtree_com")
-    monkeypatch.setattr(off, "_structs", lambda: declared)
+    monkeypatch.setattr(off, "structs", lambda: declared)
     with pytest.raises(VersionError, match="have no subtree_com"):
         off.offsets.__wrapped__()
     monkeypatch.delitem(off._SIZES, "mjtNum")

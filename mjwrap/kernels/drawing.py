@@ -18,6 +18,36 @@ def _append(out, count, x, y, z):
 
 
 @jit
+def route_points(c, routes, node, seg, seg_count, info, spacing, out, count):
+    """Write the points of one route's path to out from row `count` on; return the new count, as `polylines` does."""
+    if seg_count[c] == 0:
+        return count
+    lo, hi = routes[c, R_LO], routes[c, R_HI]
+    first, last = lo + c, lo + c + seg_count[c] - 1
+    if info[c, lay.I_STATUS] == lay.CONVERGED:
+        return count + polyline(
+            lo, hi, seg[first, G_A], seg[first, G_A + 1], seg[first, G_A + 2],
+            seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2], node, spacing, out, count,
+        )  # fmt: skip
+    for j in range(first, last + 1):
+        count = _append(out, count, seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2])
+        count = _append(out, count, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2])
+    return count
+
+
+@jit
+def route_contacts(c, routes, node, seg, seg_count, out, count):
+    """Write P and Q of each obstacle that a route touches to out, from row `count` on; return the new count."""
+    first = routes[c, R_LO] + c
+    for j in range(first, first + seg_count[c] - 1):
+        k = int(seg[j, G_FAR])
+        if k < routes[c, R_HI] and node[k, lay.KIND] != lay.VIA:
+            count = _append(out, count, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2])
+            count = _append(out, count, seg[j + 1, G_A], seg[j + 1, G_A + 1], seg[j + 1, G_A + 2])
+    return count
+
+
+@jit
 def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
     """Write the points of every muscle's path to out and where each muscle begins to starts (n + 1,); return how many.
 
@@ -30,19 +60,8 @@ def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
         while muscle < routes[c, R_MUSCLE]:
             muscle += 1
             starts[muscle] = count
-        if seg_count[c] == 0 or (only >= 0 and only != muscle):
-            continue
-        lo, hi = routes[c, R_LO], routes[c, R_HI]
-        first, last = lo + c, lo + c + seg_count[c] - 1
-        if info[c, lay.I_STATUS] == lay.CONVERGED:
-            count += polyline(
-                lo, hi, seg[first, G_A], seg[first, G_A + 1], seg[first, G_A + 2],
-                seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2], node, spacing, out, count,
-            )  # fmt: skip
-            continue
-        for j in range(first, last + 1):
-            count = _append(out, count, seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2])
-            count = _append(out, count, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2])
+        if only < 0 or only == muscle:
+            count = route_points(c, routes, node, seg, seg_count, info, spacing, out, count)
     while muscle + 1 < starts.shape[0]:
         muscle += 1
         starts[muscle] = count
@@ -58,14 +77,8 @@ def contacts(routes, node, seg, seg_count, only, out, starts):
         while muscle < routes[c, R_MUSCLE]:
             muscle += 1
             starts[muscle] = count
-        if only >= 0 and only != muscle:
-            continue
-        first = routes[c, R_LO] + c
-        for j in range(first, first + seg_count[c] - 1):
-            k = int(seg[j, G_FAR])
-            if k < routes[c, R_HI] and node[k, lay.KIND] != lay.VIA:
-                count = _append(out, count, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2])
-                count = _append(out, count, seg[j + 1, G_A], seg[j + 1, G_A + 1], seg[j + 1, G_A + 2])
+        if only < 0 or only == muscle:
+            count = route_contacts(c, routes, node, seg, seg_count, out, count)
     while muscle + 1 < starts.shape[0]:
         muscle += 1
         starts[muscle] = count

@@ -12,10 +12,12 @@ from mjwrap.kernels import coupling, layout, segments
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.plan import Plan
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import drawing as dr
 from mjwrap.plugin.callbacks import stage
 from mjwrap.plugin.callbacks.hooks import Entries
 from mjwrap.plugin.offsets import offsets
 from mjwrap.plugin.transmission import transmission_part
+from mjwrap.plugin.viewing import drawing
 
 Words = NDArray[np.int64]
 
@@ -40,6 +42,7 @@ def state_size(plan: Plan) -> int:
 
 def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> dict[str, Any]:
     n, nodes, routes = plan.n, len(plan.node), len(plan.routes)
+    sketch = drawing()
     groups = [int(model.actuator_group[m.actuator]) if m.actuator >= 0 else -1 for m in muscles]
     groups = [bk.SILENT if out >= 0 else group for out, group in zip(plan.output, groups, strict=True)]
     arrays: dict[str, Any] = {name: getattr(plan, name) for name in bk.ARRAYS if hasattr(plan, name)}
@@ -58,6 +61,10 @@ def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration])
         "written": np.zeros(model.nbody, dtype=np.bool_),
         "clock": np.zeros(bk.CLOCK),
         "transmission": transmission_part(model, plan, muscles),
+        "tendon": np.array([m.tendon for m in muscles], dtype=np.int64),
+        "actuator": np.array([m.actuator for m in muscles], dtype=np.int64),
+        "labels": np.array([m.name.encode()[: dr.LABEL - 1] for m in muscles], dtype=f"S{dr.LABEL}"),
+        "blank": np.frombuffer(sketch.blank if sketch else b"", dtype=np.uint8),
     }
     arrays |= {name: np.zeros((model.nbody, 6)) for name in ("wrench", "others", "mine", "total")}
     return {name: arrays.get(name, np.zeros(n)) for name in bk.ARRAYS}
@@ -83,6 +90,10 @@ def block_image(
     head[bk.NO_ACTUATION] = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     fields = offsets().data | offsets().model
     head[bk.TIME : bk.TIME + len(bk.FIELDS)] = [fields[name] for name in bk.FIELDS]
+    sketch = drawing()
+    if sketch:
+        head[bk.DRAW] = entries.draw.address
+        head[bk.HEAD - len(bk.DRAWING) :] = sketch.words
     pieces, here = [], 8 * bk.HEAD
     for place, array in enumerate(_arrays(model, plan, muscles).values(), start=bk.A_ROUTES):
         head[place] = here

@@ -13,7 +13,7 @@ from mjwrap.mjcf import read_declarations, read_model
 from mjwrap.muscles import ActuatorForce
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.image import state_size
-from mjwrap.plugin.placeholders import drop_placeholders
+from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders
 from mjwrap.plugin.transmission import check_room
 from mjwrap.takeover import Takeover
 
@@ -65,6 +65,7 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     names = [muscle.name for muscle in muscles]
     plan, muscles = reg.read_plan(model, names, mode)
     check_room(model, plan, muscles)
+    hide_placeholders(spec, muscles)
     _add_instance(spec, reg.configuration(names, state_size(plan), mode))
     model = _compile(spec)
     if not keep_tendons:

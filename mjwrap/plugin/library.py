@@ -60,6 +60,15 @@ def library() -> Any:
     loaded.mj_sizeModel.restype = ctypes.c_int64
     loaded.mj_saveModel.argtypes = [_ADDRESS, ctypes.c_char_p, _ADDRESS, ctypes.c_int64]
     loaded.mj_saveModel.restype = None
+    for name in ("mjv_defaultOption", "mjv_defaultScene", "mjv_defaultCamera", "mjv_freeScene"):
+        getattr(loaded, name).argtypes, getattr(loaded, name).restype = [_ADDRESS], None
+    loaded.mjv_makeScene.argtypes, loaded.mjv_makeScene.restype = [_ADDRESS, _ADDRESS, ctypes.c_int], None
+    loaded.mjv_updateScene.argtypes = [_ADDRESS] * 5 + [ctypes.c_int, _ADDRESS]
+    loaded.mjv_updateScene.restype = None
+    loaded.mjv_initGeom.argtypes, loaded.mjv_initGeom.restype = (
+        [_ADDRESS, ctypes.c_int] + [_ADDRESS] * 4,
+        None,
+    )
     return loaded
 
 

@@ -54,7 +54,7 @@ class ModelBuffer(NamedTuple):
     arrays: dict[str, int]
 
 
-def _refuse(what: str) -> VersionError:
+def refuse(what: str) -> VersionError:
     return VersionError(
         f"the engine plugin cannot run in MuJoCo {mujoco.__version__}: {what}; MuscleSystem works without it"
     )
@@ -63,40 +63,40 @@ def _refuse(what: str) -> VersionError:
 # --------------------------------------------------------------------------------- layout by the rules of C
 
 
-def _structs() -> Any:
+def structs() -> Any:
     try:
         from mujoco.introspect import structs
     except ImportError:
-        raise _refuse("it does not carry the declarations of its structs (mujoco.introspect)") from None
+        raise refuse("it does not carry the declarations of its structs (mujoco.introspect)") from None
     return structs.STRUCTS
 
 
-def _extent(kind: Any) -> tuple[int, int]:
+def extent(kind: Any) -> tuple[int, int]:
     """Return size and alignment [bytes] of a type as `mujoco.introspect` describes it."""
     form = type(kind).__name__
     if form == "PointerType":
         return _POINTER, _POINTER
     if form == "ArrayType":
-        size, alignment = _extent(kind.inner_type)
+        size, alignment = extent(kind.inner_type)
         return size * int(np.prod(kind.extents)), alignment
     if form == "AnonymousStructDecl":
-        return _walk(kind.fields)[1:]
+        return walk(kind.fields)[1:]
     name = getattr(kind, "name", "")
     if name in _SIZES:
         return _SIZES[name], _SIZES[name]
-    if name in _structs():
-        return _walk(_structs()[name].fields)[1:]
-    raise _refuse(f"the type {name or form} in its structs is unknown")
+    if name in structs():
+        return walk(structs()[name].fields)[1:]
+    raise refuse(f"the type {name or form} in its structs is unknown")
 
 
-def _walk(fields: Any) -> tuple[dict[str, int], int, int]:
+def walk(fields: Any) -> tuple[dict[str, int], int, int]:
     """Return the offset of every field, the size and the alignment of a struct [bytes]."""
     offsets: dict[str, int] = {}
     here, widest = 0, 1
     for field in fields:
         if type(field).__name__ != "StructFieldDecl":
-            raise _refuse(f"its structs contain a {type(field).__name__}")
-        size, alignment = _extent(field.type)
+            raise refuse(f"its structs contain a {type(field).__name__}")
+        size, alignment = extent(field.type)
         here = -(-here // alignment) * alignment
         offsets[field.name] = here
         here, widest = here + size, max(widest, alignment)
@@ -135,40 +135,40 @@ def _probes() -> Iterator[tuple[mujoco.MjModel, mujoco.MjData]]:
         yield model, data
 
 
-def _check_pointer(owner: Any, field: str, offset: int) -> None:
+def check_pointer(owner: Any, field: str, offset: int) -> None:
     """Raise unless the struct holds at `offset` the address of the array that Python shows under this name."""
     array = np.asarray(getattr(owner, field))
     found = ctypes.c_uint64.from_address(owner._address + offset).value
     if array.size == 0 or found != array.__array_interface__["data"][0]:
-        raise _refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
+        raise refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
 
 
 def _check_value(owner: Any, field: str, kind: Any, offset: int, expected: float) -> None:
     found = kind.from_address(owner._address + offset).value
     if found != expected:
-        raise _refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
+        raise refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
 
 
 @functools.cache
 def offsets() -> Offsets:
     """Return the offsets in the installed MuJoCo; `VersionError` where a field cannot be verified."""
-    declared = _structs()
+    declared = structs()
     if _POINTER != 8 or np.dtype(np.uintp).itemsize != 8:
-        raise _refuse("this is not a 64-bit process")
+        raise refuse("this is not a 64-bit process")
     try:
-        data, model, option = (_walk(declared[s].fields)[0] for s in ("mjData", "mjModel", "mjOption"))
+        data, model, option = (walk(declared[s].fields)[0] for s in ("mjData", "mjModel", "mjOption"))
         found = Offsets(
             {name: data[name] for name in ("time", "nplugin", *DATA_POINTERS, *PLUGIN_POINTERS)},
             {name: model[name] for name in (*MODEL_POINTERS, *MODEL_PLUGIN_POINTERS)}
             | {f"opt.{name}": model["opt"] + option[name] for name in OPTIONS},
         )
     except KeyError as error:
-        raise _refuse(f"its structs have no {error.args[0]}") from None
+        raise refuse(f"its structs have no {error.args[0]}") from None
     for living, state in _probes():
         for field in DATA_POINTERS:
-            _check_pointer(state, field, found.data[field])
+            check_pointer(state, field, found.data[field])
         for field in MODEL_POINTERS:
-            _check_pointer(living, field, found.model[field])
+            check_pointer(living, field, found.model[field])
         _check_value(state, "time", ctypes.c_double, found.data["time"], state.time)
         for name in OPTIONS:
             kind = ctypes.c_double if name == "timestep" else ctypes.c_int
@@ -178,8 +178,8 @@ def offsets() -> Offsets:
 
 def model_buffer() -> ModelBuffer:
     """Return where mjModel keeps its arrays; `VersionError` where one of them is elsewhere in a model of ours."""
-    fields = _structs()["mjModel"].fields
-    at = _walk(fields)[0]
+    fields = structs()["mjModel"].fields
+    at = walk(fields)[0]
     pointers = {
         f.name: at[f.name] for f in fields if type(f.type).__name__ == "PointerType" and f.name != "buffer"
     }
@@ -187,7 +187,7 @@ def model_buffer() -> ModelBuffer:
         for name, offset in pointers.items():
             shown = getattr(model, name, None)
             if isinstance(shown, np.ndarray) and shown.size:
-                _check_pointer(model, name, offset)
+                check_pointer(model, name, offset)
         _check_value(model, "nbuffer", ctypes.c_int64, at["nbuffer"], model.nbuffer)
     return ModelBuffer(at["buffer"], at["nbuffer"], at["opt"], pointers)
 
@@ -196,7 +196,7 @@ def verify_plugin_fields(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Verify the fields that only a model with plugins has: model needs two instances with states of their own."""
     found = offsets()
     for field in MODEL_PLUGIN_POINTERS:
-        _check_pointer(model, field, found.model[field])
+        check_pointer(model, field, found.model[field])
     for field in PLUGIN_POINTERS:
-        _check_pointer(data, field, found.data[field])
+        check_pointer(data, field, found.data[field])
     _check_value(data, "nplugin", ctypes.c_int, found.data["nplugin"], data.nplugin)

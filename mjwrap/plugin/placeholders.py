@@ -2,6 +2,11 @@
 
 A tendon whose number of stops (`tendon_num`) is 0 has no length, no Jacobian and no cost. The number itself is kept in
 `wrap_prm` of the first stop, which MuJoCo does not read for a site: so a copy of the model, or its MJB, knows it too.
+
+Where a tendon stays, MuJoCo would show it beside the path that the plugin draws. Its width is made too small to be
+seen, by a power of two, so that its own width can still be read from it: in the MjSpec, so that models compiled from
+it later, alone or attached, do not show it either. (The compiler takes no width of 0, and `to_xml` writes none below
+1e-12 m.)
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ import numpy as np
 
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.muscles import ActuatorForce
+from mjwrap.plugin.callbacks.drawing import THIN, THINNED
 
 _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_ACTUATOR)
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
@@ -125,3 +131,11 @@ def restore_placeholders(model: mujoco.MjModel) -> None:
         first = int(model.tendon_adr[tendon])
         model.tendon_num[tendon] = int(model.wrap_prm[first])
         model.wrap_prm[first] = 0.0
+
+
+def hide_placeholders(spec: mujoco.MjSpec, muscles: list[MuscleDeclaration]) -> None:
+    """Make the tendons of these muscles invisible; a width set again later is shown, and drawn by the plugin too."""
+    taken = {muscle.tendon for muscle in muscles}
+    for tendon in spec.tendons:
+        if tendon.id in taken and tendon.width >= THIN:
+            tendon.width *= THINNED

@@ -13,6 +13,7 @@ MUSCLES, NODES, ROUTES, BODIES, SITES, GEOMS, ACTS, CTRLS = 1, 2, 3, 4, 5, 6, 7,
 LOADED, NSTATE = 9, 10  # bodies that muscles pull, numbers in plugin_state
 STATE_ADDRESS = 11  # index of the instance's first number in plugin_state
 # functions
+DRAW = 12  # 0 where nothing can be drawn
 STAGE, FINISH, FREE = 13, 14, 15  # FREE: gives the block back to the system
 # byte offsets of mjData's and mjModel's fields, in this order
 FIELDS = (
@@ -32,6 +33,7 @@ ARRAYS = (
     "node", "seg", "count", "info", "own", "excitation", "drive", "start_activation", "start_fiber", "start_length",
     "activation", "fiber", "length", "velocity", "tension", "next_activation", "next_fiber", "status",
     "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost", "transmission",
+    "tendon", "actuator", "labels", "blank",
 )  # fmt: skip
 (
     A_ROUTES, A_LINKS, A_LAW, A_SOURCE, A_INDEX, A_CONTROL, A_FORM, A_GROUP, A_BODY_ROOTID, A_LOADED,
@@ -39,8 +41,40 @@ ARRAYS = (
     A_NODE, A_SEG, A_COUNT, A_INFO, A_OWN, A_EXCITATION, A_DRIVE, A_START_ACTIVATION, A_START_FIBER, A_START_LENGTH,
     A_ACTIVATION, A_FIBER, A_LENGTH, A_VELOCITY, A_TENSION, A_NEXT_ACTIVATION, A_NEXT_FIBER, A_STATUS,
     A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST, A_TRANSMISSION,
+    A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
 ) = range(40, 40 + len(ARRAYS))  # fmt: skip
-HEAD = 40 + len(ARRAYS)
+# how to draw: byte offsets in MuJoCo's structs (of an option: of its byte), the size of a mjvGeom, MuJoCo's codes, the
+# address of a function that warns and of what it says
+DRAWING = (
+    "scene.maxgeom", "scene.ngeom", "scene.geoms", "scene.status",
+    "option.label", "option.tendon", "option.actuator", "option.activation", "option.transparent",
+    "option.tendongroup", "option.actuatorgroup",
+    "geom.bytes", "geom.type", "geom.objtype", "geom.objid", "geom.category", "geom.segid", "geom.size", "geom.pos",
+    "geom.mat", "geom.rgba", "geom.emission", "geom.specular", "geom.shininess", "geom.reflectance", "geom.label",
+    "model.tendon_width", "model.tendon_rgba", "model.tendon_group", "model.tendon_matid", "model.mat_rgba",
+    "model.mat_emission", "model.mat_specular", "model.mat_shininess", "model.mat_reflectance",
+    "model.vis.rgba.actuator", "model.vis.rgba.actuatorpositive", "model.vis.rgba.contactpoint",
+    "model.vis.map.alpha", "model.vis.map.actuatortendon",
+    "code.label_tendon", "code.label_actuator", "code.capsule", "code.sphere", "code.tendon", "code.actuator",
+    "code.dynamic", "code.decor", "code.unknown",
+    "warn", "full",
+)  # fmt: skip
+_FIRST = 40 + len(ARRAYS)
+(
+    D_MAXGEOM, D_NGEOM, D_GEOMS, D_STATUS,
+    D_LABEL, D_TENDON, D_ACTUATOR, D_ACTIVATION, D_TRANSPARENT,
+    D_TENDONGROUP, D_ACTUATORGROUP,
+    G_BYTES, G_TYPE, G_OBJTYPE, G_OBJID, G_CATEGORY, G_SEGID, G_SIZE, G_POS,
+    G_MAT, G_RGBA, G_EMISSION, G_SPECULAR, G_SHININESS, G_REFLECTANCE, G_LABEL,
+    D_TENDON_WIDTH, D_TENDON_RGBA, D_TENDON_GROUP, D_TENDON_MATID, D_MAT_RGBA,
+    D_MAT_EMISSION, D_MAT_SPECULAR, D_MAT_SHININESS, D_MAT_REFLECTANCE,
+    D_ACTUATOR_RGBA, D_ACTIVE_RGBA, D_CONTACT_RGBA,
+    D_ALPHA, D_ACTUATOR_SCALE,
+    C_LABEL_TENDON, C_LABEL_ACTUATOR, C_CAPSULE, C_SPHERE, C_TENDON, C_ACTUATOR,
+    C_DYNAMIC, C_DECOR, C_UNKNOWN,
+    D_WARN, D_FULL,
+) = range(_FIRST, _FIRST + len(DRAWING))  # fmt: skip
+HEAD = _FIRST + len(DRAWING)
 
 SILENT = -2  # in `group`: the muscle's own tension is zero, since its actuator pulls
 

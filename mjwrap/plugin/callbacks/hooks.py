@@ -12,9 +12,10 @@ from numba.core import types
 
 from mjwrap.kernels.evaluation import evaluate
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st
 from mjwrap.plugin.callbacks._cache import callback, jit
-from mjwrap.plugin.callbacks.memory import call, half, store_word, word
+from mjwrap.plugin.callbacks.memory import call, call_with_four, half, store_word, word
 
 _WORD, _INT = types.int64, types.int32
 
@@ -27,6 +28,7 @@ class Hooks(NamedTuple):
     reset: Any
     compute: Any
     advance: Any
+    visualize: Any
 
 
 class Entries(NamedTuple):
@@ -34,6 +36,7 @@ class Entries(NamedTuple):
 
     stage: Any
     finish: Any
+    draw: Any
 
 
 def _evaluation() -> tuple[Any, ...]:
@@ -55,7 +58,8 @@ def compile_entries() -> Entries:
     """Compile, or load, what is the same for every MuJoCo: the one place where the kernels are linked in."""
     signature = types.void(_WORD, _WORD, _WORD)
     evaluate.compile(_evaluation())
-    return Entries(callback(signature, st.stage), callback(signature, st.finish))
+    draw = callback(types.void(_WORD, _WORD, _WORD, _WORD), drawing.draw)
+    return Entries(callback(signature, st.stage), callback(signature, st.finish), draw)
 
 
 @jit
@@ -99,10 +103,16 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
         if block != 0:
             call(word(block + 8 * bk.FINISH), block, model, data)
 
+    def visualize(model, data, option, scene, instance):
+        block = _block(data, instance, nplugin, plugin_data)
+        if block != 0 and word(block + 8 * bk.DRAW) != 0:
+            call_with_four(word(block + 8 * bk.DRAW), block, model, option, scene)
+
     return Hooks(
         callback(types.void(_WORD, _INT), destroy),
         callback(types.void(_WORD, _WORD, _WORD, _INT), copy),
         callback(types.void(_WORD, _WORD, _WORD, _INT), reset),
         callback(types.void(_WORD, _WORD, _INT, _INT), compute),
         callback(types.void(_WORD, _WORD, _INT), advance),
+        callback(types.void(_WORD, _WORD, _WORD, _WORD, _INT), visualize),
     )

@@ -28,7 +28,9 @@ def _load(kind: Any, numba_type: Any) -> Any:
 
 word: Any = _load(_WORD, types.int64)  # the 64-bit integer at an address
 half: Any = _load(ir.IntType(32), types.int32)  # the 32-bit integer at an address
+byte: Any = _load(ir.IntType(8), types.uint8)  # the byte at an address
 real: Any = _load(ir.DoubleType(), types.float64)  # the double at an address
+single: Any = _load(ir.FloatType(), types.float32)  # the float at an address
 
 
 @intrinsic
@@ -52,16 +54,29 @@ def store_word(typing_context: Any, address: Any, value: Any) -> Any:
     return types.none(types.int64, types.int64), generate
 
 
-@intrinsic
-def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any) -> Any:
-    """Call void f(word, word, word) by its address."""
+def _calling(number: int) -> Any:
+    """Return how a function of `number` words is called by its address."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kind = ir.FunctionType(ir.VoidType(), [_WORD] * 3)
+        kind = ir.FunctionType(ir.VoidType(), [_WORD] * number)
         builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), list(arguments[1:]))
         return context.get_dummy_value()
 
-    return types.none(types.int64, types.int64, types.int64, types.int64), generate
+    return types.none(*[types.int64] * (1 + number)), generate
+
+
+@intrinsic
+def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any) -> Any:
+    """Call void f(word, word, word) by its address."""
+    return _calling(3)
+
+
+@intrinsic
+def call_with_four(
+    typing_context: Any, function: Any, first: Any, second: Any, third: Any, fourth: Any
+) -> Any:
+    """Call void f(word, word, word, word) by its address."""
+    return _calling(4)
 
 
 @jit
@@ -86,3 +101,15 @@ def halves(address, shape):
 def flags(address, shape):
     """Return the bytes at an address as an array of booleans of the given shape."""
     return carray(pointer(address), shape, np.bool_)
+
+
+@jit
+def singles(address, shape):
+    """Return the floats at an address as an array of the given shape."""
+    return carray(pointer(address), shape, np.float32)
+
+
+@jit
+def octets(address, shape):
+    """Return the bytes at an address as an array of the given shape."""
+    return carray(pointer(address), shape, np.uint8)

@@ -166,6 +166,14 @@ def _advance_into(block, data, state, wrench):
 
 
 @jit
+def _erase(block):
+    """Leave no path to draw; those that the next evaluation needs are in plugin_state."""
+    count = _ints(block, bk.A_COUNT, (word(block + 8 * bk.ROUTES),))
+    for c in range(count.shape[0]):
+        count[c] = 0
+
+
+@jit
 def _since(time, step, ended, clock):
     """Return how long ago the step began [s] to which this stage of Runge-Kutta belongs.
 
@@ -192,6 +200,7 @@ def stage(block, model, data):
     idle = half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION) != 0
     if idle and not transmits:
         clock[bk.ACTED] = 0.0
+        _erase(block)
         return
     n, nodes, routes, bodies = _sizes(block)
     step, since, ahead = real(model + word(block + 8 * bk.TIMESTEP)), 0.0, 0.0
@@ -313,6 +322,7 @@ def forget(block, state):
     cold = reals(state, (word(block + 8 * bk.NSTATE),))
     for i in range(cold.shape[0]):
         cold[i] = 0.0
+    _erase(block)
     n, _, _, bodies = _sizes(block)
     failures = _ints(block, bk.A_FAILURES, (n,))
     for m in range(n):
