@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Torus
     from mjwrap.system import MuscleSystem
     from mjwrap.trials import MuscleTrial, simulate_muscle
+    from mjwrap.video import Video
 
 __version__ = "0.1.0"
 
@@ -122,6 +123,7 @@ _HOMES = {
     "Recorder": "recording",
     "install": "plugin",
     "load": "plugin",
+    "Video": "video",
 }
 
 __all__ = [
@@ -168,6 +170,7 @@ __all__ = [
     "Umberger2010",
     "VersionError",
     "ViaPoint",
+    "Video",
     "basal_power",
     "fit_capsule",
     "fit_cone",

@@ -1,26 +1,24 @@
 """`Recorder`: what happened in a run, as a file that the rerun viewer replays."""
 
-import contextlib
 import math
 import os
-import signal
-import threading
 import warnings
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from mjwrap.errors import RecordingError
-from mjwrap.recording.target import PartFile
+from mjwrap.output import PartFile, require, uninterrupted
 
 if TYPE_CHECKING:
     from mjwrap.recording.frames import Buffers
     from mjwrap.recording.stream import Stream
     from mjwrap.system import MuscleSystem
 
+SUFFIX = ".rrd"
 BUFFERED = 250_000  # states of a muscle that are gathered unless the caller says otherwise; 8 MB
 
 
@@ -50,11 +48,11 @@ class Recorder:
         flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
-        _require("path_rate", path_rate, 0 < path_rate < math.inf, "a positive number of frames per second")
-        _require("flush_every", flush_every, flush_every is None or flush_every >= 1, "at least 1")
-        _require("spacing", spacing, spacing is None or 0 < spacing < math.inf, "a positive length in metres")
+        require("path_rate", path_rate, 0 < path_rate < math.inf, "a positive number of frames per second")
+        require("flush_every", flush_every, flush_every is None or flush_every >= 1, "at least 1")
+        require("spacing", spacing, spacing is None or 0 < spacing < math.inf, "a positive length in metres")
         self._ended = ""  # why no more can be logged
-        self._target = PartFile(path)
+        self._target = PartFile(path, SUFFIX)
         try:
             buffers, stream = _open(model, muscles, self._target, path_rate, flush_every, spacing)
         except BaseException:
@@ -109,7 +107,7 @@ class Recorder:
 
     def _guarded(self, action: Callable[[], None]) -> None:
         """Act whole or not at all: Ctrl-C waits for the end, an error removes the file."""
-        with _uninterrupted():
+        with uninterrupted():
             try:
                 action()
             except BaseException as error:
@@ -162,25 +160,3 @@ def _forgotten(target: PartFile, stream: "Stream") -> None:
         RuntimeWarning,
         stacklevel=2,
     )
-
-
-@contextlib.contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back until the block is done."""
-    previous = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(previous):
-        yield
-        return
-    held: list[Any] = []
-    signal.signal(signal.SIGINT, lambda *received: held.append(received))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-    if held:
-        previous(*held[-1])
-
-
-def _require(name: str, value: object, holds: bool | np.bool_, wanted: str) -> None:
-    if not holds:
-        raise RecordingError(f"{name} must be {wanted}, not {value!r}")

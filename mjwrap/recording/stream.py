@@ -8,7 +8,8 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from mjwrap.errors import RecordingError
-from mjwrap.recording.target import FilePipe, PartFile
+from mjwrap.output import PartFile
+from mjwrap.recording.target import FilePipe
 
 if TYPE_CHECKING:
     import rerun.blueprint as rrb

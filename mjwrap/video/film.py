@@ -1,0 +1,171 @@
+"""`Video`: a simulation as a film, at simulation time."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import warnings
+import weakref
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import mujoco
+
+from mjwrap.errors import RecordingError
+from mjwrap.output import PartFile, require, uninterrupted
+from mjwrap.video.formats import FORMATS, Writer
+from mjwrap.video.offscreen import Offscreen
+
+EARLY = 1e-6  # part of a frame's period by which it may come too early, for times that are not exact
+
+
+class Video:
+    """Film a simulation: what MuJoCo's renderer shows of it, as an .mp4 or .gif.
+
+    `model` is a mujoco.MjModel; the muscles of one that `install` or `load` returned are in the picture. `path` is a
+    file name that ends in .mp4 or .gif, `fps` the frames per second of the film, `speed` how many simulated seconds
+    pass in one of its seconds. `width` and `height` are in pixels. `camera` is the name or id of a camera of the
+    model, a mujoco.MjvCamera, or None for the view with which MuJoCo's viewer opens; `option` a mujoco.MjvOption.
+
+    The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
+    Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
+
+    Raises RecordingError, before the run, where no OpenGL works, `path` cannot be written or what writes it is not
+    installed; from `log` or `close` where the disk is full.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        path: str | os.PathLike[str],
+        *,
+        fps: float = 30.0,
+        speed: float = 1.0,
+        width: int = 640,
+        height: int = 480,
+        camera: str | int | mujoco.MjvCamera | None = None,
+        option: mujoco.MjvOption | None = None,
+    ) -> None:
+        require("fps", fps, 0 < fps < math.inf, "a positive number of frames per second")
+        require("speed", speed, 0 < speed < math.inf, "a positive number of simulated seconds per second")
+        for name, pixels in (("width", width), ("height", height)):
+            require(
+                name, pixels, int(pixels) == pixels and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384"
+            )
+        self._camera, self._option = _camera(model, camera), option or mujoco.MjvOption()
+        self._rate = fps / speed  # frames per simulated second
+        self._ended = ""  # why no more can be logged
+        self._start: float | None = None  # time of the first frame
+        self._number, self._last_time = -1, -math.inf  # of the last frame, of the last call
+        self._target = PartFile(path, *FORMATS)
+        size = int(width), int(height)
+        with contextlib.ExitStack() as undo:
+            undo.callback(self._target.discard)
+            self._writer: Writer = FORMATS[self._target.path.suffix](self._target.part, fps, *size)
+            undo.callback(self._writer.abandon)
+            self._canvas = Offscreen(model, *size)
+            undo.pop_all()
+        self._finalizer = weakref.finalize(self, _forgotten, self._target, self._writer)
+
+    def log(self, data: mujoco.MjData) -> None:
+        """Add the state of `data` to the film where a frame is due.
+
+        The frame shows the poses and paths that were computed last, so after `mj_step` those at which the step
+        began. Raises RecordingError where the disk is full, where time runs backwards (one film is one run), and
+        after `close`.
+        """
+        if self._ended:
+            raise RecordingError(f"cannot log to '{self._target.path}': {self._ended}")
+        time = float(data.time)
+        if not time >= self._last_time:
+            raise RecordingError(
+                f"cannot log at time {time} s after {self._last_time} s: one film is one run, in which time goes "
+                "forward; close this Video and make another one after a reset"
+            )
+        self._last_time = time
+        if self._start is None:
+            self._start = time
+        number = math.floor((time - self._start) * self._rate + EARLY)
+        if number > self._number:
+            self._number = number
+            self._guarded(
+                lambda: self._writer.add(self._canvas.picture(data, self._camera, self._option), number)
+            )
+
+    def close(self) -> None:
+        """Write what is left and give the file its name; a second call does nothing.
+
+        Raises RecordingError, and leaves nothing behind, where the disk is full or nothing was logged.
+        """
+        if not self._ended:
+            self._guarded(self._finish)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None and issubclass(kind, Exception):
+            self._discard("the run ended with an error and nothing was kept")
+        else:
+            self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is a film
+
+    def _finish(self) -> None:
+        if self._number < 0:
+            raise RecordingError(f"nothing was logged to '{self._target.path}', so there is no film")
+        self._writer.finish(self._number + 1)
+        self._target.publish()
+        self._ended = "it is closed"
+        self._finalizer.detach()
+        self._canvas.close()
+
+    def _guarded(self, action: Callable[[], None]) -> None:
+        """Act whole or not at all: Ctrl-C waits for the end, an error removes the file."""
+        with uninterrupted():
+            try:
+                action()
+            except BaseException as error:
+                self._discard(f"it failed before ({error})")
+                if isinstance(error, OSError) and not isinstance(error, RecordingError):
+                    raise self._target.failure(error) from error
+                raise
+
+    def _discard(self, why: str) -> None:
+        if self._ended:
+            return
+        self._ended = why
+        self._finalizer.detach()
+        with contextlib.suppress(Exception):  # nothing is kept, whatever the rest of it says
+            self._writer.abandon()
+        self._canvas.close()
+        self._target.discard()
+
+
+def _camera(model: mujoco.MjModel, camera: str | int | mujoco.MjvCamera | None) -> mujoco.MjvCamera:
+    """Return the camera meant; RecordingError lists the model's where there is no such."""
+    if isinstance(camera, mujoco.MjvCamera):
+        return camera
+    found = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, found)
+    if camera is None:
+        return found
+    names = [model.camera(i).name for i in range(model.ncam)]
+    number = names.index(camera) if isinstance(camera, str) and camera in names else camera
+    if isinstance(number, str) or not 0 <= number < model.ncam:
+        raise RecordingError(f"no camera {camera!r}; cameras: {', '.join(names) or 'none'}")
+    found.type, found.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), int(number)
+    return found
+
+
+def _forgotten(target: PartFile, writer: Writer) -> None:
+    with contextlib.suppress(Exception):
+        writer.abandon()
+    target.discard()
+    warnings.warn(
+        f"the Video '{target.path}' was never closed, so nothing was kept; use it in a with statement",
+        RuntimeWarning,
+        stacklevel=2,
+    )

@@ -1,0 +1,110 @@
+"""Frames into a file: MP4 through PyAV, GIF through Pillow, each loaded when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import RecordingError
+
+Picture = NDArray[np.uint8]
+GIF_RATE = 50.0  # frames per second above which viewers slow a GIF down
+_QUALITY = "18"  # x264's constant rate factor: hardly any loss to see
+
+
+class Writer(Protocol):
+    """Takes pictures with their numbers, in rising order; a number left out shows the picture before it for longer."""
+
+    def add(self, picture: Picture, number: int) -> None:
+        """Append a picture (height, width, 3)."""
+        ...
+
+    def finish(self, end: int) -> None:
+        """Complete the file; end: the number that the next picture would have had."""
+        ...
+
+    def abandon(self) -> None:
+        """Let go of the file as it is."""
+        ...
+
+
+class Mp4:
+    """H.264 in MP4, as browsers and slides play it; written while it is filmed."""
+
+    def __init__(self, part: Path, rate: float, width: int, height: int) -> None:
+        if width % 2 or height % 2:
+            raise RecordingError(f"width and height of an .mp4 must be even, not {width} and {height}")
+        try:
+            av: Any = importlib.import_module("av")
+        except ImportError as error:
+            raise RecordingError(
+                f"cannot write .mp4: {error}; install PyAV with: pip install 'mjwrap[video]', or write a .gif"
+            ) from error
+        self._av = av
+        fraction = Fraction(rate).limit_denominator(1000)
+        self._file: Any = av.open(str(part), "w", format="mp4", options={"movflags": "+faststart"})
+        stream: Any = self._file.add_stream("libx264", rate=fraction, options={"crf": _QUALITY})
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.time_base = stream.codec_context.time_base = 1 / fraction
+        self._stream = stream
+
+    def add(self, picture: Picture, number: int) -> None:
+        """Encode a picture."""
+        frame = self._av.VideoFrame.from_ndarray(picture, format="rgb24")
+        frame.pts, frame.time_base = number, self._stream.codec_context.time_base
+        self._file.mux(self._stream.encode(frame))
+
+    def finish(self, end: int) -> None:
+        """Encode what waits and close."""
+        self._file.mux(self._stream.encode(None))
+        self._file.close()
+
+    def abandon(self) -> None:
+        """Close without the rest."""
+        self._file.close()
+
+
+class Gif:
+    """A GIF that repeats, of 256 colours a picture; kept in memory until it is finished."""
+
+    def __init__(self, part: Path, rate: float, width: int, height: int) -> None:
+        if rate > GIF_RATE:
+            raise RecordingError(
+                f"a .gif shows at most {GIF_RATE:g} frames a second, not {rate:g}; write an .mp4"
+            )
+        try:
+            image: Any = importlib.import_module("PIL.Image")
+        except ImportError as error:
+            raise RecordingError(
+                f"cannot write .gif: {error}; install Pillow with: pip install pillow"
+            ) from error
+        self._image = image
+        self._part, self._rate = part, rate
+        self._pictures: list[Any] = []
+        self._numbers: list[int] = []
+
+    def add(self, picture: Picture, number: int) -> None:
+        """Reduce a picture to its 256 colours and keep it."""
+        self._pictures.append(self._image.fromarray(picture).quantize(256))
+        self._numbers.append(number)
+
+    def finish(self, end: int) -> None:
+        """Write all pictures; a GIF counts in hundredths of a second, so its rounded times add up to the right one."""
+        ticks = np.rint(100.0 * np.array([*self._numbers, end]) / self._rate).astype(int)
+        self._pictures[0].save(
+            self._part, format="GIF", save_all=True, append_images=self._pictures[1:], loop=0,
+            duration=[int(10 * ticks_shown) for ticks_shown in np.diff(ticks)],
+        )  # fmt: skip
+        self.abandon()
+
+    def abandon(self) -> None:
+        """Forget the pictures."""
+        self._pictures.clear()
+
+
+FORMATS: dict[str, type[Mp4] | type[Gif]] = {".mp4": Mp4, ".gif": Gif}

@@ -1,0 +1,95 @@
+"""Pictures of a model without a window: MuJoCo's renderer on whatever OpenGL works here."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import RecordingError
+
+MAXGEOM = 20_000  # room of the scene, as in MuJoCo's viewer
+_CHOICE = "MUJOCO_GL"
+
+
+def _backends() -> Iterator[tuple[str, str]]:
+    """Yield name and module of the backends to try: the one that MUJOCO_GL names, else what may work here."""
+    chosen = os.environ.get(_CHOICE, "").strip()
+    headless = sys.platform == "linux" and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+    if not chosen and headless:
+        yield "egl", "mujoco.egl"
+        yield "osmesa", "mujoco.osmesa"
+    else:
+        yield f"{_CHOICE}={chosen}" if chosen else "window system", "mujoco.gl_context"
+
+
+class Offscreen:
+    """A canvas of the given size [pixels] for one model; `picture` needs the thread that made it.
+
+    Raises RecordingError where no OpenGL works, with what each backend said.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+        self._model, self._rect = model, mujoco.MjrRect(0, 0, width, height)
+        faults = []
+        for name, module in _backends():
+            try:
+                with warnings.catch_warnings():  # GLFW warns, and then fails
+                    warnings.simplefilter("ignore")
+                    self._open(importlib.import_module(module), width, height)
+                break
+            except Exception as error:  # each backend fails in its own way
+                faults.append(f"{name}: {str(error).strip() or type(error).__name__}")
+        else:
+            raise RecordingError(
+                f"cannot draw: no OpenGL works here ({'; '.join(faults)}); where there is no display, set "
+                f"{_CHOICE}=egl (a graphics card's driver, or Mesa's libEGL) or {_CHOICE}=osmesa (libOSMesa) before "
+                f"mujoco is imported"
+            )
+        self._scene = mujoco.MjvScene(model, MAXGEOM)
+
+    def _open(self, backend: Any, width: int, height: int) -> None:
+        if not hasattr(backend, "GLContext"):
+            raise RuntimeError("switched off")
+        context = backend.GLContext(width, height)
+        try:
+            context.make_current()
+            renderer = mujoco.MjrContext(self._model, int(mujoco.mjtFontScale.mjFONTSCALE_100))
+        except BaseException:
+            with contextlib.suppress(Exception):
+                context.free()
+            raise
+        mujoco.mjr_resizeOffscreen(width, height, renderer)
+        mujoco.mjr_setBuffer(int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN), renderer)
+        self._context: Any = context
+        self._renderer = renderer
+
+    def picture(
+        self, data: mujoco.MjData, camera: mujoco.MjvCamera, option: mujoco.MjvOption
+    ) -> NDArray[np.uint8]:
+        """Return the picture of a state, (height, width, 3), red, green and blue from the upper left on."""
+        self._context.make_current()
+        every = int(mujoco.mjtCatBit.mjCAT_ALL)
+        mujoco.mjv_updateScene(self._model, data, option, None, camera, every, self._scene)
+        mujoco.mjr_render(self._rect, self._scene, self._renderer)
+        pixels = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(pixels, None, self._rect, self._renderer)
+        return np.ascontiguousarray(pixels[::-1])
+
+    def close(self) -> None:
+        """Give OpenGL back what the canvas took; a second call does nothing."""
+        if self._context is not None:
+            self._context.make_current()
+            self._renderer.free()
+            self._context.free()
+            self._context = None
