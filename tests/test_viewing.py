@@ -21,6 +21,7 @@ import mjwrap as mw
 from mjwrap.errors import VersionError
 from mjwrap.plugin import install, offsets, viewing
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.library import library
 
 VIS, CAT, OBJ, GEOM = mujoco.mjtVisFlag, mujoco.mjtCatBit, mujoco.mjtObj, mujoco.mjtGeom
 EPS = 2e-7  # of a number in single precision
@@ -291,6 +292,19 @@ def test_drawing_changes_nothing(integrator: int) -> None:
     assert len(drawn) == len(copied) > 10
     for one, other in zip(drawn, copied, strict=True):
         np.testing.assert_array_equal(one.mat, other.mat)
+
+
+def test_the_passive_viewer_s_own_data_draws_the_same() -> None:
+    """It copies what a scene needs into data of its own, with mjv_copyData, whenever it is synchronised."""
+    data, _ = evaluated(SCENES["elbow"])
+    model, others = data.model, mujoco.MjData(data.model)
+    copy_visible = library().mjv_copyData
+    copy_visible.argtypes, copy_visible.restype = [ctypes.c_void_p] * 3, ctypes.c_void_p
+    copy_visible(others._address, model._address, data._address)
+    ours, theirs = lines(scene_of(data)), lines(scene_of(others))
+    assert len(ours) == len(theirs) > 10
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_array_equal(one.pos, other.pos)
 
 
 @pytest.mark.parametrize(

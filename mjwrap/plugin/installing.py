@@ -15,6 +15,7 @@ from mjwrap.plugin import register as reg
 from mjwrap.plugin.image import state_size
 from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders
 from mjwrap.plugin.transmission import check_room
+from mjwrap.plugin.viewing import drawing
 from mjwrap.takeover import Takeover
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
@@ -23,12 +24,13 @@ _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.m
 def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
     """Give the muscles of an MjSpec to the engine plugin; return the compiled model, whose `mj_step` runs them.
 
-    The spec itself is changed (an instance of the plugin, actuators without force), so that it can be compiled again,
-    attached and saved. mode: "wrench" adds the muscles' forces to xfrc_applied; "transmission" gives length, velocity
-    and moment along mjwrap's paths to every actuator on a spatial tendon whose force MuJoCo itself computes (muscles of
-    other laws act by wrenches). keep_tendons: let MuJoCo go on computing, and drawing, the tendons that only say where
-    a muscle runs; else the returned model leaves out those that nothing else needs. Raises `ModelError` where its
-    muscles cannot be read, or a moment has no room; `VersionError` where MuJoCo is unknown.
+    The spec itself is changed (an instance of the plugin, actuators without force, tendons too thin to be seen), so
+    that it can be compiled again, attached and saved. mode: "wrench" adds the muscles' forces to xfrc_applied;
+    "transmission" gives length, velocity and moment along mjwrap's paths to every actuator on a spatial tendon whose
+    force MuJoCo itself computes (muscles of other laws act by wrenches). keep_tendons: let MuJoCo go on computing the
+    tendons that only say where a muscle runs; else the returned model leaves out those that nothing else needs. The
+    plugin draws the muscles. Raises `ModelError` where its muscles cannot be read, or a moment has no room;
+    `VersionError` where MuJoCo is unknown.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
@@ -65,7 +67,8 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     names = [muscle.name for muscle in muscles]
     plan, muscles = reg.read_plan(model, names, mode)
     check_room(model, plan, muscles)
-    hide_placeholders(spec, muscles)
+    if drawing():
+        hide_placeholders(spec, muscles)
     _add_instance(spec, reg.configuration(names, state_size(plan), mode))
     model = _compile(spec)
     if not keep_tendons:

@@ -30,6 +30,7 @@ from mjwrap.plugin.image import block_image, state_size
 from mjwrap.plugin.library import MjpPlugin, library, saved_model
 from mjwrap.plugin.offsets import offsets, verify_plugin_fields
 from mjwrap.plugin.placeholders import restore_placeholders
+from mjwrap.plugin.viewing import drawing
 from mjwrap.takeover import Takeover
 
 NAME = "mjwrap.muscles"
@@ -245,6 +246,7 @@ def register() -> None:
         raise VersionError("the engine plugin needs compiled kernels; NUMBA_DISABLE_JIT is set")
     offsets()
     _verify()
+    drawing()  # warns here where it cannot
     _entries()
     hooks = compile_hooks(offsets().data)
     python = {"nstate": _NSTATE(_nstate), "init": _INIT(_init)}

@@ -27,7 +27,7 @@ class Video:
     `model` is a mujoco.MjModel; the muscles of one that `install` or `load` returned are in the picture. `path` is a
     file name that ends in .mp4 or .gif, `fps` the frames per second of the film, `speed` how many simulated seconds
     pass in one of its seconds. `width` and `height` are in pixels. `camera` is the name or id of a camera of the
-    model, a mujoco.MjvCamera, or None for the view with which MuJoCo's viewer opens; `option` a mujoco.MjvOption.
+    model, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model; `option` a mujoco.MjvOption.
 
     The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
     Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
