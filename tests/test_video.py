@@ -247,6 +247,8 @@ def test_a_film_is_one_run(model: mujoco.MjModel, tmp_path: Path) -> None:
         data.time = 0.5
         with pytest.raises(mw.RecordingError, match="time goes forward"):
             video.log(data)
+        with pytest.raises(mw.RecordingError, match="another model"):
+            video.log(mujoco.MjData(spec_of(SCENES["arm"]).compile()))
     with pytest.raises(mw.RecordingError, match="it is closed"):
         video.log(data)
     with pytest.raises(mw.RecordingError, match="nothing was logged"), mw.Video(model, path, **SIZE):

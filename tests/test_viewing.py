@@ -232,6 +232,27 @@ def test_kept_tendons_are_drawn_once() -> None:
     assert min(g.size[0] for g in lines(scene_of(data))) >= 0.5 * np.float32(width)
 
 
+def test_every_instance_and_model_draws_its_own_muscles() -> None:
+    """Two arms in one model, of which one hangs lower, and another model in between."""
+    parent, alone = mujoco.MjSpec(), mujoco.MjData(install(spec_of(SCENES["arm"])))
+    for prefix, height in (("left_", 0.0), ("right_", -1.0)):
+        frame = parent.worldbody.add_frame(pos=[0, 0, height])
+        installed = spec_of(SCENES["arm"])
+        install(installed)
+        parent.attach(installed, prefix=prefix, frame=frame)
+    both = mujoco.MjData(install(parent))
+    mujoco.mj_forward(both.model, both)
+    mujoco.mj_forward(alone.model, alone)
+    option = mujoco.MjvOption()
+    option.label = int(mujoco.mjtLabel.mjLABEL_TENDON)
+    scene = scene_of(both, option)
+    assert [g.label for g in lines(scene) if g.label] == ["left_extensor", "right_extensor"]
+    expected = np.array([g.pos for g in lines(scene_of(alone))])
+    for tendon, height in enumerate((0.0, -1.0)):
+        found = np.array([g.pos for g in lines(scene) if g.objid == tendon])
+        np.testing.assert_allclose(found, expected + np.array([0, 0, height]), rtol=0.0, atol=4 * EPS)
+
+
 # --------------------------------------------------------------------------------------- when, and how safely
 
 

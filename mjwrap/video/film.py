@@ -55,6 +55,7 @@ class Video:
                 name, pixels, int(pixels) == pixels and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384"
             )
         self._camera, self._option = _camera(model, camera), option or mujoco.MjvOption()
+        self._signature = model.signature
         self._rate = fps / speed  # frames per simulated second
         self._ended = ""  # why no more can be logged
         self._start: float | None = None  # time of the first frame
@@ -78,6 +79,8 @@ class Video:
         """
         if self._ended:
             raise RecordingError(f"cannot log to '{self._target.path}': {self._ended}")
+        if data.signature != self._signature:
+            raise RecordingError(f"cannot log to '{self._target.path}': this mjData belongs to another model")
         time = float(data.time)
         if not time >= self._last_time:
             raise RecordingError(
