@@ -152,9 +152,10 @@ def test_options_choose_what_is_drawn() -> None:
         assert thick.size[0] == pytest.approx(thin.size[0] * model.vis.map.actuatortendon)
         assert thick.category == int(CAT.mjCAT_DECOR)
         np.testing.assert_array_equal(thin.pos, thick.pos)
-    model.tendon_group[2], model.actuator_group[3] = 4, 9
+    model.tendon_group[2], model.actuator_group[3] = 4, 4
     again = scene_of(data, with_option(mjVIS_ACTUATOR=1))
     assert {g.objid for g in lines(again)} == set(range(model.ntendon)) - {2}
+    assert {g.objid for g in lines(again, actuator)} == set(range(model.nu)) - {3}
     option = mujoco.MjvOption()
     option.tendongroup[4] = 1
     assert len(lines(scene_of(data, option))) == len(drawn)
@@ -200,6 +201,25 @@ def test_colours_are_those_of_a_native_muscle() -> None:
                 shade = data.model.vis.map.alpha if transparent else 1.0
                 expected_rgba = acting.rgba * [1, 1, 1, shade]
                 np.testing.assert_allclose(lines(ours, tendon)[0].rgba, expected_rgba, rtol=1e-6)
+
+
+@pytest.mark.parametrize("control", [-1.3, -0.2, 0.0, 0.4, 5.0])
+@pytest.mark.parametrize("limits", ["", "-2 1", "0.2 3", "-3 -0.1"])
+def test_any_actuator_that_pulls_along_a_path_has_its_native_colour(control: float, limits: str) -> None:
+    """In transmission mode a motor pulls too, whose control may be negative; here it keeps to its limits."""
+    limited = f'ctrllimited="true" ctrlrange="{limits}"' if limits else ""
+    motor = f'<motor name="extensor" tendon="extensor" {limited}/>'
+    spec, twin = spec_of(SCENES["arm"].replace(MUSCLE, motor)), spec_of(SCENES["arm"].replace(MUSCLE, motor))
+    datas = moving(install(spec, mode="transmission")), moving(twin.compile())
+    option = with_option(mjVIS_ACTUATOR=1, mjVIS_TENDON=0)
+    colours = []
+    for data in datas:
+        low, high = (float(x) for x in (limits or "-inf inf").split())
+        data.ctrl[:] = min(max(control, low), high)
+        mujoco.mj_forward(data.model, data)
+        found = [g for g in lines(scene_of(data, option), int(OBJ.mjOBJ_ACTUATOR)) if g.size[0] > 1e-6]
+        colours.append(found[0].rgba)
+    np.testing.assert_allclose(*colours, rtol=0.0, atol=EPS)
 
 
 def test_labels_are_muscle_names() -> None:

@@ -21,8 +21,10 @@ from mjwrap.plugin.callbacks.drawing import GROUPS, LABEL
 from mjwrap.plugin.library import library
 from mjwrap.plugin.offsets import check_pointer, extent, refuse, structs, walk
 
-_TENDON_ARRAYS = ("tendon_width", "tendon_rgba", "tendon_group", "tendon_matid")
-_MATERIAL_ARRAYS = ("mat_rgba", "mat_emission", "mat_specular", "mat_shininess", "mat_reflectance")
+_ARRAYS = (
+    "tendon_width", "tendon_rgba", "tendon_group", "tendon_matid", "actuator_group",
+    "mat_rgba", "mat_emission", "mat_specular", "mat_shininess", "mat_reflectance",
+)  # fmt: skip
 _GEOM_NUMBERS = (
     "type",
     "objtype",
@@ -41,7 +43,8 @@ _XML = """
 <mujoco>
   <visual>
     <map alpha="0.375" actuatortendon="1.625"/>
-    <rgba actuator="0.1 0.2 0.3 0.4" actuatorpositive="0.5 0.6 0.7 0.8" contactpoint="0.9 0.25 0.35 0.45"/>
+    <rgba actuator="0.1 0.2 0.3 0.4" actuatorpositive="0.5 0.6 0.7 0.8" contactpoint="0.9 0.25 0.35 0.45"
+      actuatornegative="0.55 0.65 0.75 0.85"/>
   </visual>
   <asset>
     <material name="dull" rgba="0.2 0.4 0.6 0.8" emission="0.125" specular="0.25" shininess="0.375"
@@ -57,6 +60,7 @@ _XML = """
     <spatial name="first" width="0.02" material="red"><site site="a"/><site site="b"/></spatial>
     <spatial name="second" group="1" rgba="0.3 0.2 0.1 0.5"><site site="b"/><site site="c"/></spatial>
   </tendon>
+  <actuator><motor tendon="first"/><motor tendon="second" group="3"/></actuator>
 </mujoco>
 """
 
@@ -79,7 +83,7 @@ def _visual() -> dict[str, int]:
     start, found = _fields("mjModel")[0]["vis"], {}
     sections = {field.name: field for field in structs()["mjVisual"].fields}
     for section, names in (
-        ("rgba", ("actuator", "actuatorpositive", "contactpoint")),
+        ("rgba", ("actuator", "actuatornegative", "actuatorpositive", "contactpoint")),
         ("map", ("alpha", "actuatortendon")),
     ):
         at, inner = _fields("mjVisual")[0][section], walk(sections[section].type.fields)[0]
@@ -104,7 +108,7 @@ def _int(address: int) -> int:
 
 def _verify_model(model: mujoco.MjModel, visual: dict[str, int]) -> None:
     at = _fields("mjModel")[0]
-    for name in (*_TENDON_ARRAYS, *_MATERIAL_ARRAYS):
+    for name in _ARRAYS:
         check_pointer(model, name, at[name])
     for name, offset in visual.items():
         _, _, section, field = name.split(".")

@@ -22,7 +22,6 @@ from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import (
     byte,
     call,
-    flags,
     half,
     halves,
     octets,
@@ -31,6 +30,7 @@ from mjwrap.plugin.callbacks.memory import (
     singles,
     word,
 )
+from mjwrap.plugin.callbacks.stage import GROUPS as SWITCHES
 from mjwrap.plugin.callbacks.stage import _floats, _ints, _sizes
 
 WIDTH = 0.003  # of a muscle without a tendon [m]: MuJoCo's default
@@ -39,6 +39,7 @@ THIN = 1e-7  # a width below this is a thinned one [m]
 BEAD = 1.5  # radius of a contact point [widths]
 ROOM = 4096  # points of a path for which there is room at first
 GROUPS = 6  # mjNGROUP
+TINY = 1e-15  # mjMINVAL
 LABEL = 100  # bytes of a label
 LOOK = 8  # colour (4), emission, specular, shininess, reflectance: as they follow each other in `D_MAT_...`
 
@@ -61,13 +62,24 @@ def width_of(width):
 
 
 @jit
-def _mix(block, model, share, look):
-    """Write the colour of a muscle at an activation, as MuJoCo mixes those of actuators."""
+def _mix(block, model, value, low, high, look):
+    """Write the colour of an actuator at a control, or activation, within its limits, as MuJoCo mixes it."""
+    if low == -math.inf:
+        low, high = -1.0, 1.0
+    least, middle, most = low, 0.0, high
+    if low >= 0.0:
+        least, middle = -1.0, low
+    elif high <= 0.0:
+        middle, most = high, 1.0
+    above = value > middle
+    share = (
+        (value - middle) / max(most - middle, TINY) if above else (middle - value) / max(middle - least, TINY)
+    )
     share = min(max(share, 0.0), 1.0)
+    end = _at(block, bk.D_POSITIVE_RGBA if above else bk.D_NEGATIVE_RGBA)
     for i in range(4):
         rest = single(model + _at(block, bk.D_ACTUATOR_RGBA) + 4 * i)
-        active = single(model + _at(block, bk.D_ACTIVE_RGBA) + 4 * i)
-        look[i] = rest + share * (active - rest)
+        look[i] = rest + share * (single(model + end + 4 * i) - rest)
 
 
 @jit
@@ -79,7 +91,7 @@ def _plain(block, look):
 
 
 @jit
-def _tendon_look(block, model, option, tendon, activation, look):
+def _tendon_look(block, model, option, tendon, activation, low, high, look):
     """Write colour and material of a tendon (-1: none), by the rules of MuJoCo, but for the default grey."""
     _plain(block, look)
     material, own = -1, False
@@ -100,7 +112,7 @@ def _tendon_look(block, model, option, tendon, activation, look):
             for i in range(4):
                 look[i] = single(rgba + 4 * i)
     if material < 0 and not own:
-        _mix(block, model, activation, look)
+        _mix(block, model, activation, low, high, look)
     if byte(option + _at(block, bk.D_TRANSPARENT)) != 0:
         look[3] *= single(model + _at(block, bk.D_ALPHA))
 
@@ -203,7 +215,8 @@ def draw(block, model, option, scene):
     count, info = _ints(block, bk.A_COUNT, (routes,)), _floats(block, bk.A_INFO, (routes, lay.INFO))
     activation, drive = _floats(block, bk.A_ACTIVATION, (n,)), _floats(block, bk.A_DRIVE, (n,))
     tendon, actuator = _ints(block, bk.A_TENDON, (n,)), _ints(block, bk.A_ACTUATOR, (n,))
-    group, off = _ints(block, bk.A_GROUP, (n,)), flags(block + word(block + 8 * bk.A_OFF), (n,))
+    low, high = _floats(block, bk.A_CTRL_LOW, (n,)), _floats(block, bk.A_CTRL_HIGH, (n,))
+    switched = half(model + _at(block, bk.DISABLEACTUATOR))
     by_activation = byte(option + _at(block, bk.D_ACTIVATION)) != 0
     wanted = half(option + _at(block, bk.D_LABEL))
     points, look = np.empty((ROOM, 3)), np.empty(LOOK)
@@ -217,8 +230,11 @@ def draw(block, model, option, scene):
             width = width_of(real(word(model + _at(block, bk.D_TENDON_WIDTH)) + 8 * t))
             ten_group = half(word(model + _at(block, bk.D_TENDON_GROUP)) + 4 * t)
         seen = tendons and _shows(block, option, bk.D_TENDONGROUP, ten_group)
-        acts = actuators and actuator[m] >= 0 and not off[m]
-        acts = acts and _shows(block, option, bk.D_ACTUATORGROUP, group[m])
+        acts = actuators and actuator[m] >= 0
+        if acts:
+            group = half(word(model + _at(block, bk.D_GROUP)) + 4 * actuator[m])
+            acts = _shows(block, option, bk.D_ACTUATORGROUP, group)
+            acts = acts and not (0 <= group < SWITCHES and ((switched >> group) & 1) != 0)
         if not seen and not acts:
             continue
         many = route_points(c, route, node, seg, count, info, 0.0, points, 0)
@@ -228,7 +244,7 @@ def draw(block, model, option, scene):
         label = block + _at(block, bk.A_LABELS) + LABEL * m
         if c > 0 and route[c - 1, R_MUSCLE] == m:
             label = 0
-        _tendon_look(block, model, option, t, activation[m], look)
+        _tendon_look(block, model, option, t, activation[m], low[m], high[m], look)
         identity[0], identity[1] = _at(block, bk.C_TENDON), t
         if t < 0:
             identity[0] = _at(block, bk.C_ACTUATOR if actuator[m] >= 0 else bk.C_UNKNOWN)
@@ -238,7 +254,7 @@ def draw(block, model, option, scene):
             _line(block, scene, points, many, width, identity, _at(block, bk.C_DYNAMIC), look, named)
         if acts:
             acting[0], acting[1] = _at(block, bk.C_ACTUATOR), actuator[m]
-            _mix(block, model, activation[m] if by_activation else drive[m], look)
+            _mix(block, model, activation[m] if by_activation else drive[m], low[m], high[m], look)
             wide = width * single(model + _at(block, bk.D_ACTUATOR_SCALE))
             named = label if wanted == _at(block, bk.C_LABEL_ACTUATOR) else 0
             _line(block, scene, points, many, wide, acting, _at(block, bk.C_DECOR), look, named)
