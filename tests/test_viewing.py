@@ -252,6 +252,25 @@ def test_kept_tendons_are_drawn_once() -> None:
     assert min(g.size[0] for g in lines(scene_of(data))) >= 0.5 * np.float32(width)
 
 
+def test_a_tendon_that_stays_native_is_seen_again() -> None:
+    """A motor pulls along mjwrap's path in transmission mode only; a muscle does in both."""
+    both = (
+        SCENES["arm"]
+        .replace(MUSCLE, MUSCLE + '<motor name="winch" tendon="line"/>')
+        .replace(
+            "</tendon>",
+            '<spatial name="line"><site site="origin"/><site site="insertion"/></spatial></tendon>',
+        )
+    )
+    spec = spec_of(both)
+    for mode in ("transmission", "wrench", "transmission", "wrench"):
+        data = moving(install(spec, mode=mode))
+        mujoco.mj_forward(data.model, data)
+        seen = [g.objid for g in lines(scene_of(data)) if g.size[0] > 1e-6]
+        assert seen.count(1) == 1
+        assert seen.count(0) > 5
+
+
 def test_every_instance_and_model_draws_its_own_muscles() -> None:
     """Two arms in one model, of which one hangs lower, and another model in between."""
     parent, alone = mujoco.MjSpec(), mujoco.MjData(install(spec_of(SCENES["arm"])))

@@ -13,7 +13,7 @@ from mjwrap.mjcf import read_declarations, read_model
 from mjwrap.muscles import ActuatorForce
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.image import state_size
-from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders
+from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders, show_placeholder
 from mjwrap.plugin.transmission import check_room
 from mjwrap.plugin.viewing import drawing
 from mjwrap.takeover import Takeover
@@ -40,6 +40,7 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     for element in [p for p in spec.plugins if p.plugin_name == reg.NAME and p.name == reg.INSTANCE]:
         for name in _claim(element).muscles:  # installed before: read the muscles anew
             _wake(spec.actuator(name))
+            show_placeholder(spec, name)
         element.config = reg.configuration([], 1, mode)
     model = _compile(spec)
     if int(model.opt.disableflags) & _BOTH_OFF == _BOTH_OFF:

@@ -139,3 +139,11 @@ def hide_placeholders(spec: mujoco.MjSpec, muscles: list[MuscleDeclaration]) -> 
     for tendon in spec.tendons:
         if tendon.id in taken and tendon.width >= THIN:
             tendon.width *= THINNED
+
+
+def show_placeholder(spec: mujoco.MjSpec, actuator: str) -> None:
+    """Give the tendon that an actuator pulls the width back that `hide_placeholders` has taken from it."""
+    element = spec.actuator(actuator)
+    tendon = spec.tendon(element.target) if element is not None else None
+    if tendon is not None and tendon.width < THIN:
+        tendon.width /= THINNED
