@@ -103,6 +103,7 @@ _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract"},
     "no_cfunc_wrapper": True,
+    "_nrt": False,  # no counting of references on every array handed on; no new arrays either
 }
 
 
@@ -128,6 +129,11 @@ def jit(function: F, kind: type[Kernel] = Kernel, **options: bool) -> F:
 def apart(function: F) -> F:
     """Compile a kernel whose code callers do not take over: a large one, to which a call is nothing."""
     return jit(function, Apart)
+
+
+def allocating(function: F) -> F:
+    """Compile a kernel that makes arrays of its own."""
+    return jit(function, _nrt=True)
 
 
 def inlined(function: F) -> F:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import allocating, jit
 from mjwrap.kernels.certify import minimal
 from mjwrap.kernels.geodesics import displace
 from mjwrap.kernels.inside import hold_inside
@@ -151,7 +151,7 @@ def _go_back(node, before):
             node[k, S_MODE + i] = before[k, i]
 
 
-@jit
+@allocating
 def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
     """Solve every pose of a motion: origin, insertion (T, 3), pos (T, n, 3), quat (T, n, 4); results in info (T, INFO).
 

@@ -1,8 +1,8 @@
 """Columns, kinds and codes shared by all kernels: the memory layout of paths.
 
 A chain is an ordered list of nodes between two fixed end points. All that concerns a node stands in one row of one
-float64 array `node` (N, ROW): one argument instead of seven halves the cost of a short path, because numba counts
-references on every array that it hands on. A row holds, in this order:
+float64 array `node` (N, ROW): one argument instead of seven, because numba hands an array on as seven numbers. A row
+holds, in this order:
 
     KIND        VIA, CYLINDER, SPHERE, ...
     DIM   (4)   sizes of the surface [m], in the order of its class in `mjwrap/surfaces.py`

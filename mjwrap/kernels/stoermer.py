@@ -22,6 +22,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np.arrayobj import get_cfarray_intrinsic
 
 from mjwrap.kernels._jit import config, inlined
 
@@ -66,7 +67,8 @@ def _stack(typing_context: Any) -> Any:
 
 
 stack: Any = _plain_stack if config.DISABLE_JIT else intrinsic(_stack)
-carray: Any = getattr(numba, "carray")  # noqa: B009, not declared for type checkers
+# numba's own `carray` is a function that returns an array, which kernels cannot call: they count no references
+carray: Any = getattr(numba, "carray") if config.DISABLE_JIT else get_cfarray_intrinsic("C", None)  # noqa: B009
 
 
 @inlined
