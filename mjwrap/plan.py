@@ -23,7 +23,7 @@ class Plan:
     n: int
     node: Array  # (N, ROW), cold
     links: Ints  # (N, 4)
-    routes: Ints  # (C, 7)
+    routes: Ints  # (C, 8)
     weights: Array  # (C,)
     law: Ints  # (n,)
     params: Array  # (n, PARAMS)
@@ -119,7 +119,8 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
                     rows.append(row)
                     links.append((node.site, node.geom, node.hint_site if k == 0 else -1, body))
             bodies = int(model.site_bodyid[route.origin]), int(model.site_bodyid[route.insertion])
-            routes.append((first, len(links), route.origin, route.insertion, *bodies, m))
+            surfaces = sum(geom >= 0 for _, geom, _, _ in links[first:])
+            routes.append((first, len(links), route.origin, route.insertion, *bodies, m, surfaces))
             weights.append(route.weight)
     n = len(muscles)
     params = np.zeros((n, muscle.PARAMS))

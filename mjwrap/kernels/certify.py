@@ -7,6 +7,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.clearance import tube_angle, tube_crossing
+from mjwrap.kernels.ruled import tangents_sweep
 from mjwrap.kernels.shape import turn_into_frame
 
 KIND, DIM = lay.KIND, lay.DIM
@@ -36,7 +37,7 @@ def swept(k, node):
         inverse = 1.0 / node[k, DIM]
         t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
         rate = t_phi * inverse
-        free = math.atan(node[k, W_L] * abs(rate)) + math.atan(node[k, W_LQ] * abs(rate))
+        free = tangents_sweep(node[k, W_L] * abs(rate), node[k, W_LQ] * abs(rate), 1.0)
         return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
     px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
     size = -node[k, W_L]

@@ -11,13 +11,14 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.chain import solve_chain
-from mjwrap.kernels.segments import G_A, G_B, G_E, G_FAR, G_NEAR, list_segments
+from mjwrap.kernels.segments import G_A, G_B, G_E, G_FAR, G_NEAR, VANISHING, list_segments
 
 # columns of `links` (N, 4): ids of a node's site, geom, hint site (-1 where none) and body
 L_SITE, L_GEOM, L_HINT, L_BODY = 0, 1, 2, 3
-# columns of `routes` (C, 7): first node, past the last node, origin and insertion site and their bodies, muscle
-R_LO, R_HI, R_FROM, R_TO, R_FROM_BODY, R_TO_BODY, R_MUSCLE = 0, 1, 2, 3, 4, 5, 6
-ROUTE = 7
+# columns of `routes` (C, 8): first node, past the last node, origin and insertion site and their bodies, muscle, and
+# how many nodes are surfaces' rows
+R_LO, R_HI, R_FROM, R_TO, R_FROM_BODY, R_TO_BODY, R_MUSCLE, R_SURFACES = 0, 1, 2, 3, 4, 5, 6, 7
+ROUTE = 8
 
 
 @jit
@@ -25,28 +26,29 @@ def _place(lo, hi, links, site_xpos, geom_xpos, geom_xmat, node):
     """Write the present poses, and at a cold start the hints, of nodes lo..hi; return whether one is cold."""
     cold = False
     for k in range(lo, hi):
+        row = node[k]
         site, geom = links[k, L_SITE], links[k, L_GEOM]
         if geom < 0:
+            pos = site_xpos[site]
             for i in range(3):
-                node[k, lay.POS + i] = site_xpos[site, i]
+                row[lay.POS + i] = pos[i]
             continue
+        pos, rot = geom_xpos[geom], geom_xmat[geom]
         for i in range(3):
-            node[k, lay.POS + i] = geom_xpos[geom, i]
+            row[lay.POS + i] = pos[i]
         for i in range(9):
-            node[k, lay.ROT + i] = geom_xmat[geom, i]
-        if node[k, lay.S_MODE] != lay.COLD:
+            row[lay.ROT + i] = rot[i]
+        if row[lay.S_MODE] != lay.COLD:
             continue
         cold = True
         hint = links[k, L_HINT]
         if hint >= 0:
-            x = site_xpos[hint, 0] - geom_xpos[geom, 0]
-            y = site_xpos[hint, 1] - geom_xpos[geom, 1]
-            z = site_xpos[hint, 2] - geom_xpos[geom, 2]
-            node[k, lay.HINT] = 1.0
+            x = site_xpos[hint, 0] - pos[0]
+            y = site_xpos[hint, 1] - pos[1]
+            z = site_xpos[hint, 2] - pos[2]
+            row[lay.HINT] = 1.0
             for i in range(3):
-                node[k, lay.HINT + 1 + i] = (
-                    geom_xmat[geom, i] * x + geom_xmat[geom, 3 + i] * y + geom_xmat[geom, 6 + i] * z
-                )
+                row[lay.HINT + 1 + i] = rot[i] * x + rot[3 + i] * y + rot[6 + i] * z
     return cold
 
 
@@ -62,9 +64,52 @@ def _roll_back(lo, hi, cold, node):
 
 
 @jit
+def _solve_straight(c, routes, links, site_xpos, node, seg, seg_count, info):
+    """Find the path of route c over via points alone; one whose points are not finite has no segments."""
+    lo, hi, site = routes[c, R_LO], routes[c, R_HI], routes[c, R_FROM]
+    x, y, z = site_xpos[site, 0], site_xpos[site, 1], site_xpos[site, 2]
+    total = 0.0
+    for k in range(lo, hi + 1):
+        site = links[k, L_SITE] if k < hi else routes[c, R_TO]
+        point = site_xpos[site]
+        px, py, pz = point[0], point[1], point[2]
+        ex, ey, ez = px - x, py - y, pz - z
+        size = math.sqrt(ex * ex + ey * ey + ez * ez)
+        scale = 1.0 / size if size > VANISHING else 0.0
+        total += size
+        row = seg[k + c]
+        row[G_NEAR] = k - 1
+        row[G_FAR] = k
+        row[G_A] = x
+        row[G_A + 1] = y
+        row[G_A + 2] = z
+        row[G_B] = px
+        row[G_B + 1] = py
+        row[G_B + 2] = pz
+        row[G_E] = ex * scale
+        row[G_E + 1] = ey * scale
+        row[G_E + 2] = ez * scale
+        if k < hi:
+            node[k, lay.POS] = px
+            node[k, lay.POS + 1] = py
+            node[k, lay.POS + 2] = pz
+        x, y, z = px, py, pz
+    good = math.isfinite(total)
+    seg_count[c] = hi - lo + 1 if good else 0
+    info[c, lay.I_LENGTH] = total if good else 0.0
+    info[c, lay.I_STATUS] = lay.CONVERGED if good else lay.NON_FINITE
+    info[c, lay.I_ERROR] = 0.0
+    info[c, lay.I_ITERATIONS] = 0
+    info[c, lay.I_EVALUATIONS] = 0
+
+
+@jit
 def solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg, seg_count, info):
     """Find the path of every route; info (C, INFO), seg and seg_count keep the last good ones of failed routes."""
     for c in range(routes.shape[0]):
+        if routes[c, R_SURFACES] == 0:
+            _solve_straight(c, routes, links, site_xpos, node, seg, seg_count, info)
+            continue
         lo, hi = routes[c, R_LO], routes[c, R_HI]
         a, b = routes[c, R_FROM], routes[c, R_TO]
         cold = _place(lo, hi, links, site_xpos, geom_xpos, geom_xmat, node)
@@ -91,17 +136,28 @@ def end_body(routes, links, c, index):
 
 
 @jit
-def _rate(body, seg, j, column, cvel, subtree_com, body_rootid):
-    """Return e . v of the segment end in columns `column` as a point of `body`; cvel refers to the root's subtree."""
-    root = body_rootid[body]
-    rx = seg[j, column] - subtree_com[root, 0]
-    ry = seg[j, column + 1] - subtree_com[root, 1]
-    rz = seg[j, column + 2] - subtree_com[root, 2]
-    wx, wy, wz = cvel[body, 0], cvel[body, 1], cvel[body, 2]
-    vx = cvel[body, 3] + wy * rz - wz * ry
-    vy = cvel[body, 4] + wz * rx - wx * rz
-    vz = cvel[body, 5] + wx * ry - wy * rx
-    return seg[j, G_E] * vx + seg[j, G_E + 1] * vy + seg[j, G_E + 2] * vz
+def _ends(c, j, routes, links, row):
+    """Return the bodies that hold the near and the far end of segment j of route c, whose row is given."""
+    near, far = j - c - 1, j - c
+    if routes[c, R_SURFACES] > 0:
+        near, far = int(row[G_NEAR]), int(row[G_FAR])
+    return end_body(routes, links, c, near), end_body(routes, links, c, far)
+
+
+@jit
+def _moment(row, column, centre):
+    """Return r x e of a segment, where r is its end in columns `column` from a tree's centre of mass [m]."""
+    rx, ry, rz = row[column] - centre[0], row[column + 1] - centre[1], row[column + 2] - centre[2]
+    ex, ey, ez = row[G_E], row[G_E + 1], row[G_E + 2]
+    return ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
+
+
+@jit
+def _rate(velocity, row, mx, my, mz):
+    """Return e . v of a body's point, about which e has the moment m; velocity: the body's row of cvel."""
+    return (row[G_E] * velocity[3] + row[G_E + 1] * velocity[4] + row[G_E + 2] * velocity[5]) + (
+        mx * velocity[0] + my * velocity[1] + mz * velocity[2]
+    )
 
 
 @jit
@@ -109,12 +165,18 @@ def route_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
     """Return the lengthening speed of route c (17) [m/s]."""
     total = 0.0
     first = routes[c, R_LO] + c
+    curved = routes[c, R_SURFACES] > 0
     for j in range(first, first + seg_count[c]):
-        near = end_body(routes, links, c, int(seg[j, G_NEAR]))
-        far = end_body(routes, links, c, int(seg[j, G_FAR]))
-        if near != far:
-            total += _rate(far, seg, j, G_B, cvel, subtree_com, body_rootid)
-            total -= _rate(near, seg, j, G_A, cvel, subtree_com, body_rootid)
+        row = seg[j]
+        near, far = _ends(c, j, routes, links, row)
+        if near == far:
+            continue
+        root = body_rootid[far]
+        mx, my, mz = _moment(row, G_B, subtree_com[root])
+        total += _rate(cvel[far], row, mx, my, mz)
+        if curved or body_rootid[near] != root:  # e may not be along a segment that vanishes
+            mx, my, mz = _moment(row, G_A, subtree_com[body_rootid[near]])
+        total -= _rate(cvel[near], row, mx, my, mz)
     return total
 
 
@@ -150,22 +212,25 @@ def measure_muscles(
 
 
 @jit
-def _pull(wrench, body, seg, j, column, xipos, fx, fy, fz):
-    """Add a force at a segment end to the body's wrench at its centre of mass; force, then torque, world frame."""
-    rx = seg[j, column] - xipos[body, 0]
-    ry = seg[j, column + 1] - xipos[body, 1]
-    rz = seg[j, column + 2] - xipos[body, 2]
-    wrench[body, 0] += fx
-    wrench[body, 1] += fy
-    wrench[body, 2] += fz
-    wrench[body, 3] += ry * fz - rz * fy
-    wrench[body, 4] += rz * fx - rx * fz
-    wrench[body, 5] += rx * fy - ry * fx
+def _pull(pulled, force, row, mx, my, mz):
+    """Add a force along e, and its moment, to a body's row."""
+    pulled[0] += force * row[G_E]
+    pulled[1] += force * row[G_E + 1]
+    pulled[2] += force * row[G_E + 2]
+    pulled[3] += force * mx
+    pulled[4] += force * my
+    pulled[5] += force * mz
 
 
 @jit
-def body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench):
-    """Write to wrench (nbody, 6) what all muscles do to every body, in the convention of `xfrc_applied`."""
+def body_wrenches(
+    routes, weights, links, seg, seg_count, tension, subtree_com, body_rootid, xipos, wrench
+):  # fmt: skip
+    """Write to wrench (nbody, 6) what all muscles do to every body, in the convention of `xfrc_applied`.
+
+    Moments are added up about the centre of mass of a body's tree, which both ends of a segment mostly share, and
+    moved to the body's own in the end.
+    """
     for b in range(wrench.shape[0]):
         for i in range(6):
             wrench[b, i] = 0.0
@@ -174,14 +239,25 @@ def body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench
         if force == 0.0:
             continue
         first = routes[c, R_LO] + c
+        curved = routes[c, R_SURFACES] > 0
         for j in range(first, first + seg_count[c]):
-            near = end_body(routes, links, c, int(seg[j, G_NEAR]))
-            far = end_body(routes, links, c, int(seg[j, G_FAR]))
+            row = seg[j]
+            near, far = _ends(c, j, routes, links, row)
             if near == far:
                 continue
-            fx, fy, fz = force * seg[j, G_E], force * seg[j, G_E + 1], force * seg[j, G_E + 2]
-            _pull(wrench, near, seg, j, G_A, xipos, fx, fy, fz)
-            _pull(wrench, far, seg, j, G_B, xipos, -fx, -fy, -fz)
+            root = body_rootid[far]
+            mx, my, mz = _moment(row, G_B, subtree_com[root])
+            _pull(wrench[far], -force, row, mx, my, mz)
+            if curved or body_rootid[near] != root:
+                mx, my, mz = _moment(row, G_A, subtree_com[body_rootid[near]])
+            _pull(wrench[near], force, row, mx, my, mz)
+    for b in range(wrench.shape[0]):
+        pulled, centre, own = wrench[b], subtree_com[body_rootid[b]], xipos[b]
+        fx, fy, fz = pulled[0], pulled[1], pulled[2]
+        rx, ry, rz = centre[0] - own[0], centre[1] - own[1], centre[2] - own[2]
+        pulled[3] += ry * fz - rz * fy
+        pulled[4] += rz * fx - rx * fz
+        pulled[5] += rx * fy - ry * fx
 
 
 # ------------------------------------------------------------------ xfrc_applied, shared with others

@@ -21,6 +21,7 @@ from mjwrap.kernels.ruled import (
     CLEAR,
     INSIDE,
     set_free,
+    tangents_sweep,
     wrap_cone,
     wrap_cylinder,
     wrap_elliptic_cylinder,
@@ -75,7 +76,7 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
     root_b = math.sqrt(max(square_b - square, 0.0))
     wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     sweep = math.atan2(math.sqrt(wx * wx + wy * wy + wz * wz), ax * bx + ay * by + az * bz)
-    arc = sweep - math.atan2(root_a, radius) - math.atan2(root_b, radius)
+    arc = sweep - tangents_sweep(root_a, root_b, radius)
     if arc <= CLEAR:
         set_free(node, k, sweep)
         return inside

@@ -34,5 +34,5 @@ def evaluate(
     failed = False
     for m in range(status.shape[0]):
         failed = failed or status[m] != 0
-    body_wrenches(routes, weights, links, seg, seg_count, tension, xipos, wrench)
+    body_wrenches(routes, weights, links, seg, seg_count, tension, subtree_com, body_rootid, xipos, wrench)
     return failed

@@ -16,7 +16,7 @@ from mjwrap.kernels.direct import closed_form
 from mjwrap.kernels.geodesics import geodesic
 from mjwrap.kernels.relax import between, keep
 from mjwrap.kernels.shape import turn_into_frame
-from mjwrap.kernels.span import any_in, outside, restore, settle
+from mjwrap.kernels.span import any_in, outside, restore, settle, wrap_lone
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T
@@ -198,6 +198,10 @@ def solve_span(lo, hi, ends, node, tol, direct):
     length is that of the path from the surface point next to it.
     """
     warm = not any_in(lo, hi, node, COLD)
+    if direct and warm and hi - lo == 1 and closed_form(node[lo, KIND]):
+        good, total, error = wrap_lone(lo, ends, node, tol)
+        if good:
+            return lay.CONVERGED, total, error, 0, 1
     node[lo, W_FIRST] = -1.0
     status, total, error, iterations, evaluations = settle(lo, hi, ends, node, tol, direct)
     if _found(status) and not (warm and _moved_far(lo, hi, ends, node)):

@@ -103,11 +103,11 @@ def evaluate(lo, hi, ends, node):
     for k in range(lo, hi):
         if node[k, S_MODE] == TOUCHED:
             geodesic(k, node, ends[0], ends[1], ends[2])
-    return _connect(lo, hi, ends, node)
+    return connect(lo, hi, ends, node)
 
 
 @jit
-def _connect(lo, hi, ends, node):
+def connect(lo, hi, ends, node):
     """Put straight segments between the geodesics that the rows hold; return ||f||^2.
 
     Where an end point lies on a surface there is no straight segment whose direction could differ from t.
@@ -338,7 +338,7 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=UNKNOWN):
     """
     evaluations = 0
     if square < 0.0:
-        square = _connect(lo, hi, ends, node) if square == GEODESICS else evaluate(lo, hi, ends, node)
+        square = connect(lo, hi, ends, node) if square == GEODESICS else evaluate(lo, hi, ends, node)
         evaluations = 1
     if node[lo, lay.W_FIRST] < 0.0:
         node[lo, lay.W_FIRST] = square

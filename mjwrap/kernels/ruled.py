@@ -106,16 +106,25 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
 
 
 @jit
-def _sweep(k, node, ax, ay, bx, by, alpha_a, alpha_b, hint_x, hint_y, radius):
-    """Return the angle that the string sweeps about the axis: the saved branch's, the hint's or the shorter one
-    [rad].
-    """
+def _hinted(k, node):
+    """Return whether a hint chooses the side of a surface: at a cold start."""
+    return node[k, S_MODE] == lay.COLD and node[k, HINT] > 0.0
+
+
+@jit
+def _sweep(k, node, ax, ay, bx, by):
+    """Return the angle that the string sweeps about the axis: the saved branch's, or else the shorter one [rad]."""
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    if node[k, S_MODE] != lay.COLD:
-        return follow(sweep, node[k, S_SWEEP])
-    if node[k, HINT] > 0.0:
-        return _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
-    return sweep
+    return sweep if node[k, S_MODE] == lay.COLD else follow(sweep, node[k, S_SWEEP])
+
+
+@jit
+def tangents_sweep(root_a, root_b, radius):
+    """Return the angle that straight tangents of these lengths from A and B sweep about a circle [rad].
+
+    It is the sum of two arc tangents of root / radius, each less than a quarter turn.
+    """
+    return math.atan2(radius * (root_a + root_b), radius * radius - root_a * root_b)
 
 
 @jit
@@ -137,9 +146,12 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
     root_a = math.sqrt(max(square_a - square, 0.0))
     root_b = math.sqrt(max(square_b - square, 0.0))
-    alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
-    sweep = _sweep(k, node, ax, ay, bx, by, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], radius)
-    arc = abs(sweep) - alpha_a - alpha_b
+    sweep = _sweep(k, node, ax, ay, bx, by)
+    if _hinted(k, node):
+        alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
+        hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
+        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+    arc = abs(sweep) - tangents_sweep(root_a, root_b, radius)
     if arc <= CLEAR:
         set_free(node, k, sweep)
         return inside
@@ -185,11 +197,13 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
     root_a = math.sqrt(max(square_a - 1.0, 0.0))
     root_b = math.sqrt(max(square_b - 1.0, 0.0))
-    alpha_a, alpha_b = math.atan(root_a), math.atan(root_b)
-    sweep = _sweep(
-        k, node, px, py, qx, qy, alpha_a, alpha_b, node[k, HINT + 1] / a, node[k, HINT + 2] / b, 1.0
-    )
-    arc = abs(sweep) - alpha_a - alpha_b
+    sweep = _sweep(k, node, px, py, qx, qy)
+    if _hinted(k, node):
+        hint_x, hint_y = node[k, HINT + 1] / a, node[k, HINT + 2] / b
+        sweep = _hinted_sweep(
+            px, py, qx, qy, sweep, math.atan(root_a), math.atan(root_b), hint_x, hint_y, 1.0
+        )
+    arc = abs(sweep) - tangents_sweep(root_a, root_b, 1.0)
     if arc <= CLEAR:
         set_free(node, k, sweep)
         return inside
@@ -241,9 +255,11 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     alpha_a, root_a = _tangent_ruling(rho_a, reach_a)
     alpha_b, root_b = _tangent_ruling(rho_b, reach_b)
     principal = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    sweep = _sweep(
-        k, node, ax, ay, bx, by, alpha_a, alpha_b, node[k, HINT + 1], node[k, HINT + 2], max(reach_a, reach_b)
-    )
+    sweep = _sweep(k, node, ax, ay, bx, by)
+    if _hinted(k, node):
+        hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
+        reach = max(reach_a, reach_b)
+        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, reach)
     # along the ruling from the apex: m = reach (sine + cosine^2 / sine) = reach / sine on the surface and off it
     along_a = max(reach_a, 0.0) / sine if root_a == 0.0 else reach_a / sine
     along_b = max(reach_b, 0.0) / sine if root_b == 0.0 else reach_b / sine

@@ -13,9 +13,9 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.certify import branched, minimal, slip
-from mjwrap.kernels.direct import closed_form, holds
+from mjwrap.kernels.direct import closed_form, holds, wrap
 from mjwrap.kernels.geodesics import displace, geodesic
-from mjwrap.kernels.newton import GEODESICS, ON_SURFACE, UNKNOWN, newton
+from mjwrap.kernels.newton import GEODESICS, ON_SURFACE, UNKNOWN, connect, newton
 from mjwrap.kernels.relax import path_length, relax
 from mjwrap.kernels.shape import into_frame, project
 from mjwrap.kernels.sides import search_rows, shorten
@@ -149,6 +149,33 @@ def _ends_short(lo, hi, node):
                 return True
             last = k
     return last >= 0 and node[last, lay.W_LQ] <= ON_SURFACE * node[last, lay.SIZE]
+
+
+@jit
+def wrap_lone(k, ends, node, tol):
+    """Find the path over obstacle k alone, whose wrap has a closed form, on its saved branch.
+
+    Returns whether it is certified as `settle` certifies it, its length [m] and ||f||; the saved solution stays as it
+    was where it is not.
+    """
+    hi = k + 1
+    _remember(k, hi, node)
+    good = wrap(
+        k, node, ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], ends[6], ends[7], ends[8], False
+    ) == 0
+    error = 0.0
+    if node[k, S_MODE] == TOUCHED:
+        error = math.sqrt(connect(k, hi, ends, node))
+        good = good and error <= tol and not _ends_short(k, hi, node)
+        good = good and follow_branch(k, hi, node) and minimal(k, hi, node) and in_range(k, hi, ends, node)
+        node[k, lay.S_BEFORE] = node[k, lay.W_L]
+        node[k, lay.S_BEFORE + 1] = node[k, lay.W_LQ]
+    total = path_length(k, hi, ends, node)
+    if not good:
+        for i in range(lay.STATE):
+            node[k, S_MODE + i] = node[k, W_OLD + i]
+    node[k, lay.W_REPAIRS] = 0.0
+    return good, total, error
 
 
 @apart

@@ -33,10 +33,9 @@ def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
 def state_size(plan: Plan) -> int:
     """Return how many numbers of plugin_state the muscles of a plan need; `stage.py` says what they are."""
     numbers = 1 + stage.PER_MUSCLE * plan.n + 13 * len(loaded_bodies(plan))
-    for low, high in plan.routes[:, [coupling.R_LO, coupling.R_HI]]:
-        surfaces = int(np.count_nonzero(plan.links[low:high, coupling.L_GEOM] >= 0))
+    for low, high, surfaces in plan.routes[:, [coupling.R_LO, coupling.R_HI, coupling.R_SURFACES]]:
         if surfaces:
-            numbers += surfaces * stage.SAVED + 1 + int(high - low + 1) * segments.SEGMENT
+            numbers += int(surfaces * stage.SAVED + 1 + (high - low + 1) * segments.SEGMENT)
     return numbers
 
 

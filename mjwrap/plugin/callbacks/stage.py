@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels import segments as sg
-from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, ROUTE, put, take_back
+from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE, body_wrenches, put, take_back
 from mjwrap.kernels.dynamics import TIMES, write_states
 from mjwrap.kernels.evaluation import evaluate
 from mjwrap.kernels.muscle import PARAMS
@@ -52,66 +52,101 @@ def _sizes(block):
 
 
 @jit
-def _exchange(block, state, save):
-    """Copy between plugin_state and the block: warm starts, own states, excitations and last good forces.
+def _load(block, state):
+    """Read own states, excitations, last lengths and forces, and the surfaces' warm starts from plugin_state.
 
-    Modes are stored as their distance from COLD, so that zeros are cold. The excitations are read, never written.
+    Modes are stored as their distance from COLD, so that zeros are cold.
     """
     n, nodes, routes, _ = _sizes(block)
-    node, seg = (
-        _floats(block, bk.A_NODE, (nodes, lay.ROW)),
-        _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
-    )
-    links, route = _ints(block, bk.A_LINKS, (nodes, 4)), _ints(block, bk.A_ROUTES, (routes, ROUTE))
-    count, own = _ints(block, bk.A_COUNT, (routes,)), _floats(block, bk.A_OWN, (n, 2))
-    excitation = _floats(block, bk.A_EXCITATION, (n,))
+    node, links = _floats(block, bk.A_NODE, (nodes, lay.ROW)), _ints(block, bk.A_LINKS, (nodes, 4))
+    route = _ints(block, bk.A_ROUTES, (routes, ROUTE))
+    own, excitation = _floats(block, bk.A_OWN, (n, 2)), _floats(block, bk.A_EXCITATION, (n,))
     length, velocity = _floats(block, bk.A_LENGTH, (n,)), _floats(block, bk.A_VELOCITY, (n,))
     tension = _floats(block, bk.A_TENSION, (n,))
     at = 1
     for m in range(n):
-        if save:
-            state[at], state[at + 1] = own[m, 0], own[m, 1]
-            state[at + 3], state[at + 4], state[at + 5] = length[m], velocity[m], tension[m]
-        else:
-            own[m, 0], own[m, 1], excitation[m] = state[at], state[at + 1], state[at + 2]
-            length[m], velocity[m], tension[m] = state[at + 3], state[at + 4], state[at + 5]
+        own[m, 0], own[m, 1], excitation[m] = state[at], state[at + 1], state[at + 2]
+        length[m], velocity[m], tension[m] = state[at + 3], state[at + 4], state[at + 5]
         at += PER_MUSCLE
     for c in range(routes):
-        surfaces = False
+        if route[c, R_SURFACES] == 0:
+            continue  # a path of straight segments is always found
         for k in range(route[c, R_LO], route[c, R_HI]):
             if links[k, L_GEOM] < 0:
                 continue
-            surfaces = True
-            if save:
-                state[at] = node[k, lay.S_MODE] - lay.COLD
-                for i in range(1, lay.STATE):
-                    state[at + i] = node[k, lay.S_MODE + i]
-                for i in range(4):
-                    state[at + lay.STATE + i] = node[k, lay.HINT + i]
-            else:
-                node[k, lay.S_MODE] = state[at] + lay.COLD
-                for i in range(1, lay.STATE):
-                    node[k, lay.S_MODE + i] = state[at + i]
-                for i in range(4):
-                    node[k, lay.HINT + i] = state[at + lay.STATE + i]
+            node[k, lay.S_MODE] = state[at] + lay.COLD
+            for i in range(1, lay.STATE):
+                node[k, lay.S_MODE + i] = state[at + i]
+            for i in range(4):
+                node[k, lay.HINT + i] = state[at + lay.STATE + i]
             at += SAVED
-        if not surfaces:
-            continue  # a path of straight segments is always found
-        first, last = route[c, R_LO] + c, route[c, R_HI] + c + 1
-        if save:
-            state[at] = count[c]
-        else:
-            fits = 0.0 <= state[at] <= last - first  # anybody may write to plugin_state
+        at += _room(c, route)
+
+
+@jit
+def _room(c, route):
+    """Return how many numbers of plugin_state the segments of route c have: their count, then a row for each."""
+    return 1 + sg.SEGMENT * (route[c, R_HI] - route[c, R_LO] + 1)
+
+
+@jit
+def _load_held(block, state):
+    """Read the segments of the last good paths of the routes that have none now."""
+    n, nodes, routes, _ = _sizes(block)
+    route, info = _ints(block, bk.A_ROUTES, (routes, ROUTE)), _floats(block, bk.A_INFO, (routes, lay.INFO))
+    seg, count = (
+        _floats(block, bk.A_SEG, ((nodes + routes) * sg.SEGMENT,)),
+        _ints(block, bk.A_COUNT, (routes,)),
+    )
+    at = 1 + PER_MUSCLE * n
+    for c in range(routes):
+        if route[c, R_SURFACES] == 0:
+            continue
+        at += SAVED * route[c, R_SURFACES]
+        if info[c, lay.I_STATUS] != lay.CONVERGED:
+            most = route[c, R_HI] - route[c, R_LO] + 1
+            fits = 0.0 <= state[at] <= most  # anybody may write to plugin_state
             count[c] = int(state[at]) if fits else 0
-        at += 1
-        for j in range(first, last):
-            for i in range(sg.SEGMENT):
-                if save:
-                    state[at + i] = seg[j, i]
-                else:
-                    seg[j, i] = state[at + i]
-            at += sg.SEGMENT
-    return at
+            first = sg.SEGMENT * (route[c, R_LO] + c)
+            for i in range(sg.SEGMENT * count[c]):
+                seg[first + i] = state[at + 1 + i]
+        at += _room(c, route)
+
+
+@jit
+def _save(block, state):
+    """Write what `_load` and `_load_held` read, but for the excitations, which are the user's."""
+    n, nodes, routes, _ = _sizes(block)
+    node, links = _floats(block, bk.A_NODE, (nodes, lay.ROW)), _ints(block, bk.A_LINKS, (nodes, 4))
+    seg, count = (
+        _floats(block, bk.A_SEG, ((nodes + routes) * sg.SEGMENT,)),
+        _ints(block, bk.A_COUNT, (routes,)),
+    )
+    route, own = _ints(block, bk.A_ROUTES, (routes, ROUTE)), _floats(block, bk.A_OWN, (n, 2))
+    length, velocity = _floats(block, bk.A_LENGTH, (n,)), _floats(block, bk.A_VELOCITY, (n,))
+    tension = _floats(block, bk.A_TENSION, (n,))
+    at = 1
+    for m in range(n):
+        state[at], state[at + 1] = own[m, 0], own[m, 1]
+        state[at + 3], state[at + 4], state[at + 5] = length[m], velocity[m], tension[m]
+        at += PER_MUSCLE
+    for c in range(routes):
+        if route[c, R_SURFACES] == 0:
+            continue
+        for k in range(route[c, R_LO], route[c, R_HI]):
+            if links[k, L_GEOM] < 0:
+                continue
+            state[at] = node[k, lay.S_MODE] - lay.COLD
+            for i in range(1, lay.STATE):
+                state[at + i] = node[k, lay.S_MODE + i]
+            for i in range(4):
+                state[at + lay.STATE + i] = node[k, lay.HINT + i]
+            at += SAVED
+        state[at] = count[c]
+        first = sg.SEGMENT * (route[c, R_LO] + c)
+        for i in range(sg.SEGMENT * count[c]):
+            state[at + 1 + i] = seg[first + i]
+        at += _room(c, route)
 
 
 @jit
@@ -209,14 +244,14 @@ def stage(block, model, data):
     else:
         ahead = step
     if since == 0.0:
-        _exchange(block, state, False)
+        _load(block, state)
     off, group = flags(block + word(block + 8 * bk.A_OFF), (n,)), _ints(block, bk.A_GROUP, (n,))
     switched = half(model + word(block + 8 * bk.DISABLEACTUATOR))
     for m in range(n):
         off[m] = idle or group[m] == bk.SILENT
         off[m] = off[m] or (0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0)
     wrench = _floats(block, bk.A_WRENCH, (bodies, 6))
-    evaluate(
+    failed = evaluate(
         _ints(block, bk.A_ROUTES, (routes, ROUTE)),
         _floats(block, bk.A_WEIGHTS, (routes,)),
         _ints(block, bk.A_LINKS, (nodes, 4)),
@@ -263,6 +298,20 @@ def stage(block, model, data):
         _ints(block, bk.A_STATUS, (n,)),
         wrench,
     )
+    if failed and since == 0.0:
+        _load_held(block, state)
+        body_wrenches(
+            _ints(block, bk.A_ROUTES, (routes, ROUTE)),
+            _floats(block, bk.A_WEIGHTS, (routes,)),
+            _ints(block, bk.A_LINKS, (nodes, 4)),
+            _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
+            _ints(block, bk.A_COUNT, (routes,)),
+            _floats(block, bk.A_TENSION, (n,)),
+            reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
+            _ints(block, bk.A_BODY_ROOTID, (bodies,)),
+            reals(word(data + word(block + 8 * bk.XIPOS)), (bodies, 3)),
+            wrench,
+        )
     status, lost = _ints(block, bk.A_STATUS, (n,)), flags(block + word(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
         lost[m] = status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
@@ -306,7 +355,7 @@ def finish(block, model, data):
         reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
         _floats(block, bk.A_OWN, (n, 2)),
     )
-    _exchange(block, state, True)
+    _save(block, state)
     lost, failures = flags(block + word(block + 8 * bk.A_LOST), (n,)), _ints(block, bk.A_FAILURES, (n,))
     for m in range(n):
         if lost[m]:
