@@ -43,7 +43,7 @@ def spec_of(label: str) -> mujoco.MjSpec:
 
 
 def compiled(label: str, mode: str | None, integrator: str = "Euler") -> mujoco.MjModel:
-    """Return a model with its muscles in the plugin, or (mode None) as it is; `ModelError` for a mode that is unknown."""
+    """Return a model with its muscles in the plugin, or (mode None) as it is; `ModelError` for an unknown mode."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Attaching a spec with an empty prefix")
         model = spec_of(label).compile() if mode is None else mw.install(spec_of(label), mode)
