@@ -1,4 +1,4 @@
-"""All muscles of a model in one compiled call: poses in, lengths, tensions and wrenches on bodies out.
+"""All muscles of a model in one compiled call: poses and velocities in, paths, lengths and their rates out.
 
 Arrays named as in MuJoCo's mjData and mjModel have their shapes and frames. A muscle has one or more routes (chains
 of nodes); several are joined by pulleys and enter with their weights.
@@ -64,13 +64,78 @@ def _roll_back(lo, hi, cold, node):
 
 
 @jit
-def _solve_straight(c, routes, links, site_xpos, node, seg, seg_count, info):
+def end_body(routes, links, c, index):
+    """Return the body that holds a segment's end: a node's, or the origin's or insertion's of route c."""
+    if index < routes[c, R_LO]:
+        return routes[c, R_FROM_BODY]
+    if index >= routes[c, R_HI]:
+        return routes[c, R_TO_BODY]
+    return links[index, L_BODY]
+
+
+@jit
+def ends(c, j, routes, links, row):
+    """Return the bodies that hold the near and the far end of segment j of route c, whose row is given."""
+    near, far = j - c - 1, j - c
+    if routes[c, R_SURFACES] > 0:
+        near, far = int(row[G_NEAR]), int(row[G_FAR])
+    return end_body(routes, links, c, near), end_body(routes, links, c, far)
+
+
+@jit
+def moment(row, column, centre):
+    """Return r x e of a segment, where r is its end in columns `column` from a tree's centre of mass [m]."""
+    rx, ry, rz = row[column] - centre[0], row[column + 1] - centre[1], row[column + 2] - centre[2]
+    ex, ey, ez = row[G_E], row[G_E + 1], row[G_E + 2]
+    return ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
+
+
+@jit
+def _rate(velocity, row, mx, my, mz):
+    """Return e . v of a body's point, about which e has the moment m; velocity: the body's row of cvel."""
+    return (row[G_E] * velocity[3] + row[G_E + 1] * velocity[4] + row[G_E + 2] * velocity[5]) + (
+        mx * velocity[0] + my * velocity[1] + mz * velocity[2]
+    )
+
+
+@jit
+def _rates(row, near, far, curved, cvel, subtree_com, body_rootid):
+    """Return how fast the segment in a row lengthens, whose ends two bodies hold [m/s].
+
+    curved: its ends may lie on surfaces, where e need not be along a segment that vanishes.
+    """
+    root = body_rootid[far]
+    mx, my, mz = moment(row, G_B, subtree_com[root])
+    rate = _rate(cvel[far], row, mx, my, mz)
+    if curved or body_rootid[near] != root:
+        mx, my, mz = moment(row, G_A, subtree_com[body_rootid[near]])
+    return rate - _rate(cvel[near], row, mx, my, mz)
+
+
+@jit
+def _curved_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid):
+    """Return the lengthening speed of route c over surfaces (17) [m/s]."""
+    total = 0.0
+    first = routes[c, R_LO] + c
+    for j in range(first, first + seg_count[c]):
+        near, far = ends(c, j, routes, links, seg[j])
+        if near != far:
+            total += _rates(seg[j], near, far, True, cvel, subtree_com, body_rootid)
+    return total
+
+
+@jit
+def _solve_straight(
+    c, routes, links, site_xpos, cvel, subtree_com, body_rootid, node, seg, seg_count, info
+):  # fmt: skip
     """Find the path of route c over via points alone; one whose points are not finite has no segments."""
     lo, hi, site = routes[c, R_LO], routes[c, R_HI], routes[c, R_FROM]
+    near = routes[c, R_FROM_BODY]
     x, y, z = site_xpos[site, 0], site_xpos[site, 1], site_xpos[site, 2]
-    total = 0.0
+    total, speed = 0.0, 0.0
     for k in range(lo, hi + 1):
         site = links[k, L_SITE] if k < hi else routes[c, R_TO]
+        far = links[k, L_BODY] if k < hi else routes[c, R_TO_BODY]
         point = site_xpos[site]
         px, py, pz = point[0], point[1], point[2]
         ex, ey, ez = px - x, py - y, pz - z
@@ -93,6 +158,9 @@ def _solve_straight(c, routes, links, site_xpos, node, seg, seg_count, info):
             node[k, lay.POS] = px
             node[k, lay.POS + 1] = py
             node[k, lay.POS + 2] = pz
+        if near != far:
+            speed += _rates(row, near, far, False, cvel, subtree_com, body_rootid)
+        near = far
         x, y, z = px, py, pz
     good = math.isfinite(total)
     seg_count[c] = hi - lo + 1 if good else 0
@@ -101,14 +169,20 @@ def _solve_straight(c, routes, links, site_xpos, node, seg, seg_count, info):
     info[c, lay.I_ERROR] = 0.0
     info[c, lay.I_ITERATIONS] = 0
     info[c, lay.I_EVALUATIONS] = 0
+    info[c, lay.I_SPEED] = speed
 
 
 @jit
-def solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg, seg_count, info):
-    """Find the path of every route; info (C, INFO), seg and seg_count keep the last good ones of failed routes."""
+def solve_routes(
+    routes, links, site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, body_rootid, tol,
+    node, seg, seg_count, info,
+):  # fmt: skip
+    """Find path and speed of every route; info (C, INFO), seg and seg_count keep what failed routes had."""
     for c in range(routes.shape[0]):
         if routes[c, R_SURFACES] == 0:
-            _solve_straight(c, routes, links, site_xpos, node, seg, seg_count, info)
+            _solve_straight(
+                c, routes, links, site_xpos, cvel, subtree_com, body_rootid, node, seg, seg_count, info
+            )
             continue
         lo, hi = routes[c, R_LO], routes[c, R_HI]
         a, b = routes[c, R_FROM], routes[c, R_TO]
@@ -118,6 +192,9 @@ def solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg,
         solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, True, info, c)
         if info[c, lay.I_STATUS] == lay.CONVERGED:
             seg_count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
+            info[c, lay.I_SPEED] = _curved_speed(
+                c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
+            )
         else:
             inside = (
                 info[c, lay.I_STATUS] == lay.ENDPOINT_INSIDE
@@ -126,64 +203,7 @@ def solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg,
 
 
 @jit
-def end_body(routes, links, c, index):
-    """Return the body that holds a segment's end: a node's, or the origin's or insertion's of route c."""
-    if index < routes[c, R_LO]:
-        return routes[c, R_FROM_BODY]
-    if index >= routes[c, R_HI]:
-        return routes[c, R_TO_BODY]
-    return links[index, L_BODY]
-
-
-@jit
-def _ends(c, j, routes, links, row):
-    """Return the bodies that hold the near and the far end of segment j of route c, whose row is given."""
-    near, far = j - c - 1, j - c
-    if routes[c, R_SURFACES] > 0:
-        near, far = int(row[G_NEAR]), int(row[G_FAR])
-    return end_body(routes, links, c, near), end_body(routes, links, c, far)
-
-
-@jit
-def _moment(row, column, centre):
-    """Return r x e of a segment, where r is its end in columns `column` from a tree's centre of mass [m]."""
-    rx, ry, rz = row[column] - centre[0], row[column + 1] - centre[1], row[column + 2] - centre[2]
-    ex, ey, ez = row[G_E], row[G_E + 1], row[G_E + 2]
-    return ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
-
-
-@jit
-def _rate(velocity, row, mx, my, mz):
-    """Return e . v of a body's point, about which e has the moment m; velocity: the body's row of cvel."""
-    return (row[G_E] * velocity[3] + row[G_E + 1] * velocity[4] + row[G_E + 2] * velocity[5]) + (
-        mx * velocity[0] + my * velocity[1] + mz * velocity[2]
-    )
-
-
-@jit
-def route_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid):
-    """Return the lengthening speed of route c (17) [m/s]."""
-    total = 0.0
-    first = routes[c, R_LO] + c
-    curved = routes[c, R_SURFACES] > 0
-    for j in range(first, first + seg_count[c]):
-        row = seg[j]
-        near, far = _ends(c, j, routes, links, row)
-        if near == far:
-            continue
-        root = body_rootid[far]
-        mx, my, mz = _moment(row, G_B, subtree_com[root])
-        total += _rate(cvel[far], row, mx, my, mz)
-        if curved or body_rootid[near] != root:  # e may not be along a segment that vanishes
-            mx, my, mz = _moment(row, G_A, subtree_com[body_rootid[near]])
-        total -= _rate(cvel[near], row, mx, my, mz)
-    return total
-
-
-@jit
-def measure_muscles(
-    routes, weights, links, seg, seg_count, info, cvel, subtree_com, body_rootid, length, velocity, status
-):
+def measure_muscles(routes, weights, info, length, velocity, status):
     """Turn solved routes into length [m], velocity [m/s] and status of every muscle, (n,) each.
 
     A muscle with a route without a path keeps its last values; its status says why.
@@ -200,117 +220,10 @@ def measure_muscles(
         if code == lay.CONVERGED:
             for r in range(first, c):
                 total += weights[r] * info[r, lay.I_LENGTH]
-                speed += weights[r] * route_speed(
-                    r, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
-                )
+                speed += weights[r] * info[r, lay.I_SPEED]
             if math.isfinite(speed):
                 length[m] = total
                 velocity[m] = speed
             else:
                 code = lay.NON_FINITE
         status[m] = code
-
-
-@jit
-def _pull(pulled, force, row, mx, my, mz):
-    """Add a force along e, and its moment, to a body's row."""
-    pulled[0] += force * row[G_E]
-    pulled[1] += force * row[G_E + 1]
-    pulled[2] += force * row[G_E + 2]
-    pulled[3] += force * mx
-    pulled[4] += force * my
-    pulled[5] += force * mz
-
-
-@jit
-def body_wrenches(
-    routes, weights, links, seg, seg_count, tension, subtree_com, body_rootid, xipos, wrench
-):  # fmt: skip
-    """Write to wrench (nbody, 6) what all muscles do to every body, in the convention of `xfrc_applied`.
-
-    Moments are added up about the centre of mass of a body's tree, which both ends of a segment mostly share, and
-    moved to the body's own in the end.
-    """
-    for b in range(wrench.shape[0]):
-        for i in range(6):
-            wrench[b, i] = 0.0
-    for c in range(routes.shape[0]):
-        force = weights[c] * tension[routes[c, R_MUSCLE]]
-        if force == 0.0:
-            continue
-        first = routes[c, R_LO] + c
-        curved = routes[c, R_SURFACES] > 0
-        for j in range(first, first + seg_count[c]):
-            row = seg[j]
-            near, far = _ends(c, j, routes, links, row)
-            if near == far:
-                continue
-            root = body_rootid[far]
-            mx, my, mz = _moment(row, G_B, subtree_com[root])
-            _pull(wrench[far], -force, row, mx, my, mz)
-            if curved or body_rootid[near] != root:
-                mx, my, mz = _moment(row, G_A, subtree_com[body_rootid[near]])
-            _pull(wrench[near], force, row, mx, my, mz)
-    for b in range(wrench.shape[0]):
-        pulled, centre, own = wrench[b], subtree_com[body_rootid[b]], xipos[b]
-        fx, fy, fz = pulled[0], pulled[1], pulled[2]
-        rx, ry, rz = centre[0] - own[0], centre[1] - own[1], centre[2] - own[2]
-        pulled[3] += ry * fz - rz * fy
-        pulled[4] += rz * fx - rx * fz
-        pulled[5] += rx * fy - ry * fx
-
-
-# ------------------------------------------------------------------ xfrc_applied, shared with others
-
-
-@jit
-def take_back(xfrc, others, mine, total, written):
-    """Leave in xfrc_applied (nbody, 6) what others put there.
-
-    Rows still as mjwrap wrote them get others' share back to the bit. Where a row was set to zero since then (a reset,
-    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back, nor
-    where others have assigned the same again. From rows that others have changed otherwise, mjwrap's last contribution
-    is subtracted.
-    """
-    cleared, untouched = False, False
-    for b in range(xfrc.shape[0]):
-        if written[b]:
-            zero, same = True, True
-            for i in range(6):
-                zero = zero and xfrc[b, i] == 0.0
-                same = same and xfrc[b, i] == total[b, i]
-            cleared = cleared or (zero and not same)
-            untouched = untouched or (same and not zero)
-    cleared = cleared and not untouched
-    for b in range(xfrc.shape[0]):
-        if not written[b]:
-            continue
-        zero, same, assigned = True, True, True
-        for i in range(6):
-            zero = zero and xfrc[b, i] == 0.0
-            same = same and xfrc[b, i] == total[b, i]
-            assigned = assigned and xfrc[b, i] == others[b, i]
-        for i in range(6):
-            if same:
-                xfrc[b, i] = others[b, i]
-            elif not (zero or cleared or assigned):
-                xfrc[b, i] -= mine[b, i]
-        written[b] = False
-
-
-@jit
-def put(xfrc, others, mine, total, written, wrench):
-    """Take the last contribution back and add the new wrench (nbody, 6) to xfrc_applied."""
-    take_back(xfrc, others, mine, total, written)
-    for b in range(xfrc.shape[0]):
-        loaded = False
-        for i in range(6):
-            loaded = loaded or wrench[b, i] != 0.0
-        if not loaded:
-            continue
-        written[b] = True
-        for i in range(6):
-            others[b, i] = xfrc[b, i]
-            mine[b, i] = wrench[b, i]
-            xfrc[b, i] += wrench[b, i]
-            total[b, i] = xfrc[b, i]

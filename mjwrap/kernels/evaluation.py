@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.coupling import body_wrenches, measure_muscles, solve_routes
+from mjwrap.kernels.coupling import measure_muscles, solve_routes
 from mjwrap.kernels.dynamics import drive_muscles, read_states
+from mjwrap.kernels.wrenches import body_wrenches
 
 
 @jit
@@ -19,14 +20,15 @@ def evaluate(
     Muscles that are `off` (n,) pull with no tension and keep their states. The other arguments are those of the
     kernels called.
     """
-    solve_routes(routes, links, site_xpos, geom_xpos, geom_xmat, tol, node, seg, seg_count, info)
+    solve_routes(
+        routes, links, site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, body_rootid, tol,
+        node, seg, seg_count, info,
+    )  # fmt: skip
     read_states(
         source, index, control, ctrl_low, ctrl_high, form, times, act, ctrl, own, excitation, since, timestep,
         start_activation, start_fiber, drive,
     )  # fmt: skip
-    measure_muscles(
-        routes, weights, links, seg, seg_count, info, cvel, subtree_com, body_rootid, length, velocity, status
-    )
+    measure_muscles(routes, weights, info, length, velocity, status)
     drive_muscles(
         law, params, source, form, times, off, since, ahead, drive, start_activation, start_fiber, start_length,
         length, velocity, activation, fiber, tension, next_activation, next_fiber, status,

@@ -103,4 +103,5 @@ I_STATUS = 1
 I_ERROR = 2  # tangency error, the norm of f over all touched obstacles (30)
 I_ITERATIONS = 3
 I_EVALUATIONS = 4
-INFO = 5
+I_SPEED = 5  # lengthening speed, of routes whose bodies move [m/s]
+INFO = 6

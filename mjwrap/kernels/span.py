@@ -160,9 +160,10 @@ def wrap_lone(k, ends, node, tol):
     """
     hi = k + 1
     _remember(k, hi, node)
-    good = wrap(
-        k, node, ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], ends[6], ends[7], ends[8], False
-    ) == 0
+    good = (
+        wrap(k, node, ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], ends[6], ends[7], ends[8], False)
+        == 0
+    )
     error = 0.0
     if node[k, S_MODE] == TOUCHED:
         error = math.sqrt(connect(k, hi, ends, node))

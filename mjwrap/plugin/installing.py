@@ -14,6 +14,7 @@ from mjwrap.muscles import ActuatorForce
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.image import state_size
 from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders, show_placeholder
+from mjwrap.plugin.resting import rest_actuators
 from mjwrap.plugin.transmission import check_room
 from mjwrap.plugin.viewing import drawing
 from mjwrap.takeover import Takeover
@@ -74,6 +75,7 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     model = _compile(spec)
     if not keep_tendons:
         drop_placeholders(model, declared)
+        rest_actuators(model, reg.HUSHED)
     return model
 
 

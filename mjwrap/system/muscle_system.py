@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from mjwrap.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.errors import StateError
-from mjwrap.kernels import coupling, dynamics, layout, moments
+from mjwrap.kernels import dynamics, layout, moments, wrenches
 from mjwrap.kernels.muscle import PATH_ACTUATOR
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
@@ -66,7 +66,7 @@ class MuscleSystem(Evaluator):
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
         state.applied = data.time
         state.failures += state.status != 0
-        coupling.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
+        wrenches.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
 
     def advance(self, data: mujoco.MjData) -> None:
         """Bring the states that mjwrap integrates itself to the end of the step for which `apply` put its forces in.
@@ -163,10 +163,10 @@ class MuscleSystem(Evaluator):
     def _act(self, state: State, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0) -> None:
         """Evaluate at the present stage of `data`, whose kinematics are fresh, and put the wrenches in."""
         self._evaluate(state, data, data, since, ahead)
-        coupling.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
+        wrenches.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
 
     def _take_back(self, state: State, data: mujoco.MjData) -> None:
-        coupling.take_back(data.xfrc_applied, state.others, state.mine, state.total, state.written)
+        wrenches.take_back(data.xfrc_applied, state.others, state.mine, state.total, state.written)
 
     def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> None:
         """Runge-Kutta: act in MuJoCo's control callback, which it calls at every stage."""

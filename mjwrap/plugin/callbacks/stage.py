@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels import segments as sg
-from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE, body_wrenches, put, take_back
+from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE
 from mjwrap.kernels.dynamics import TIMES, write_states
 from mjwrap.kernels.evaluation import evaluate
 from mjwrap.kernels.muscle import PARAMS
+from mjwrap.kernels.wrenches import body_wrenches, put, take_back
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word, words
@@ -151,7 +152,7 @@ def _save(block, state):
 
 @jit
 def _forces(block, data):
-    """Return xfrc_applied and the arrays that `coupling.put` and `take_back` share."""
+    """Return xfrc_applied and the arrays that `wrenches.put` and `take_back` share."""
     bodies = word(block + 8 * bk.BODIES)
     return (
         reals(word(data + word(block + 8 * bk.XFRC)), (bodies, 6)),
