@@ -29,6 +29,12 @@ ENVIRONMENT["PYTHONPATH"] = str(BENCHMARKS.parent)
         ("bench_paths.py", ["--json", "no/such/x.json"], "there is no folder"),
         ("bench_step.py", ["--repeats", "0"], "--repeats must be at least 1"),
         ("bench_step.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("bench_models.py", ["--runs", "0"], "--runs must be at least 1"),
+        ("bench_models.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("bench_models.py", ["--models", "spider"], "invalid choice: 'spider'"),
+        ("bench_rollout.py", ["--steps", "0"], "--steps must be at least 1"),
+        ("bench_rollout.py", ["--threads", "1", "0"], "--threads must be at least 1"),
+        ("bench_rollout.py", ["--json", "no/such/x.json"], "there is no folder"),
         ("bench_muscle.py", ["--repeats", "0"], "--repeats must be at least 1"),
         ("bench_muscle.py", ["--step", "nan"], "--step must be above 0"),
         ("bench_muscle.py", ["--json", "no/such/x.json"], "there is no folder"),
@@ -70,6 +76,41 @@ def test_the_step_benchmark_runs_and_adds_up(tmp_path: Path) -> None:
         assert row["ratio"] > 0
         assert row["kernel_calls"] > 1
         assert row["kernels"] > 0
+
+
+def test_the_benchmarks_of_installed_models_pair_what_they_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The elbow, with and without the plugin: all variants start every block from the same state."""
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    bench, throughput = importlib.import_module("bench_models"), importlib.import_module("bench_rollout")
+    file, label = tmp_path / "rows.json", bench.HOME
+    modes = ["wrench", bench.SYSTEM]
+    arguments = ["--models", label, "--modes", *modes, "--runs", "1", "--json", str(file)]
+    monkeypatch.setattr(sys, "argv", ["bench_models.py", *arguments])
+    assert bench.main() == 0
+    rows = json.loads(file.read_text(encoding="utf-8"))[label]
+    assert list(rows) == [*modes, "native"]
+    for mode, row in rows.items():
+        assert row["failures"] == row["lost"] == 0
+        assert 0.0 < row["median"] <= row["p95"]
+        assert row["ratio"] == 1.0 if mode == "native" else row["ratio"] > 0.0
+        assert mode == "native" or mode in capsys.readouterr().out or mode == bench.SYSTEM
+    leader, native = bench.Variant(label, "wrench", "Euler"), bench.Variant(label, None, "Euler")
+    leader.block(0.4)
+    native.follow(leader.data)
+    np.testing.assert_array_equal(native.data.qpos, leader.data.qpos)
+    assert native.data.time == leader.data.time == pytest.approx(bench.BLOCK * leader.model.opt.timestep)
+    native.data.qpos[0] = np.nan
+    native.block(0.4)
+    assert (native.lost, leader.lost) == (1, 0)
+    arguments = ["--models", label, "--envs", "3", "--steps", "45", "--repeats", "1", "--json", str(file)]
+    monkeypatch.setattr(sys, "argv", ["bench_rollout.py", *arguments])
+    assert throughput.main() == 0
+    rows = json.loads(file.read_text(encoding="utf-8"))[label]
+    assert rows["same bits"]
+    assert rows["rollout, 1"]["scaling"] == rows["batch, 1"]["native scaling"] == 1.0
+    assert rows["batch, 2"]["mjwrap"] > 0.0
 
 
 def test_the_muscle_benchmark_counts_what_it_times(

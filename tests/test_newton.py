@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scenes import random_scene
 
 import mjwrap as mw
-from mjwrap.kernels import geodesics, newton
+from mjwrap.kernels import chain, geodesics, newton, stoermer
 from mjwrap.kernels import layout as lay
 from mjwrap.paths.scene import pack
 
@@ -102,3 +102,34 @@ def test_folded_path_is_not_accepted() -> None:
     assert np.abs(residual(node, ends)).max() < 1e-14
     error, _, _ = newton.newton(0, 1, ends, node, 1e-10, 25)
     assert error == pytest.approx(np.sqrt(8.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [mw.Cylinder(0.05, 0.08), mw.Sphere(0.05), mw.EllipticCylinder((0.06, 0.04)), mw.Cone(0.06, 0.03, 0.1)],
+)
+def test_a_lone_wrap_is_the_path_that_newtons_method_finds(surface: mw.Surface) -> None:
+    """Step after step of a motion that winds, lifts off and slides off the end of the surface: `direct` or not."""
+    # an elliptic cylinder's geodesics are integrated, with this estimate of the error; the others' are closed forms
+    bound = stoermer.TOLERANCE if isinstance(surface, mw.EllipticCylinder) else 1e-12
+    seen: list[tuple[int, float]] = []
+    direct, iterated = (pack([mw.Obstacle(surface)]) for _ in range(2))
+    info = np.zeros((2, lay.INFO))
+    for time in np.linspace(0.0, 1.0, 400):
+        high = 0.03 * np.sin(9.0 * time)
+        a = np.array([0.13 * np.cos(2.0 + 9.0 * time), 0.13 * np.sin(2.0 + 9.0 * time), high])
+        b = np.array([0.11 + 0.03 * np.sin(20.0 * time), -0.02, 0.06 * np.sin(5.0 * time)])
+        for row, node in enumerate((direct, iterated)):
+            chain.solve_chain(0, 1, *a, *b, node, 1e-10, row == 0, info, row)
+        assert info[0, lay.I_STATUS] == info[1, lay.I_STATUS]
+        seen.append((int(info[0, lay.I_STATUS]), float(direct[0, lay.S_MODE])))
+        if seen[-1][0] != lay.CONVERGED:
+            for node in (direct, iterated):
+                node[0, lay.S_MODE] = lay.COLD
+            continue
+        assert info[0, lay.I_ERROR] <= 1e-10
+        assert abs(info[0, lay.I_LENGTH] - info[1, lay.I_LENGTH]) <= bound
+        assert direct[0, lay.S_MODE] == iterated[0, lay.S_MODE]
+        if not isinstance(surface, mw.Sphere):  # which has no sides
+            assert abs(direct[0, lay.S_SWEEP] - iterated[0, lay.S_SWEEP]) <= 1e-8
+    assert {mode for status, mode in seen if status == lay.CONVERGED} == {lay.FREE, lay.TOUCHED}

@@ -342,12 +342,15 @@ def test_tendons_that_only_show_the_way_are_left_out(tmp_path: Path) -> None:
     lean, full = install(spec_of(SCENES["arm"])), install(spec_of(SCENES["arm"]), keep_tendons=True)
     assert lean.tendon_num.tolist() == [0]
     assert full.tendon_num.tolist() == [6]
+    curves = [int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_MUSCLE)]  # nor is a force computed
+    assert [int(model.actuator_gaintype[0]) for model in (lean, full)] == curves
     mujoco.mj_saveModel(lean, str(tmp_path / "lean.mjb"))
     datas = [moving(model) for model in (lean, full, copy.copy(lean), load(tmp_path / "lean.mjb"))]
     for data in datas:
         data.ctrl[:] = 0.6
         mujoco.mj_step(data.model, data, nstep=50)
         np.testing.assert_array_equal(state_of(data), state_of(datas[0]))
+        assert data.actuator_force[0] == 0.0 < data.act[0]
     assert full.ntendon == 1
     assert datas[0].ten_length[0] == 0.0 < datas[1].ten_length[0]
 
