@@ -7,11 +7,16 @@ with other excitations; its first block is not counted. Times are the CPU time o
 `failures` are steps of muscles without a converged path, `lost` are blocks after which a state was not finite or MuJoCo
 had reset it. Exit code 1 where a state was lost, 2 for a bad argument; with --target also 1 where a mode is slower than
 the native model.
+
+--profile says where the time goes: the plugin's `compute` and `advance`, called by their addresses on the state after
+half a second; what MuJoCo takes to carry xfrc_applied to the joints (native steps with and without forces of 1e-200 N
+on the loaded bodies); and MuJoCo's own rest of a step.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import json
 import sys
 from collections.abc import Callable
@@ -25,6 +30,8 @@ from installed_models import HOME, MODELS, MODES, compiled, excitations
 
 import mjwrap as mw
 from mjwrap.plugin import read
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.library import library
 
 BLOCK = 20  # steps between two looks at the clock, and between two changes of the controls
 RUN = 25  # blocks of a run, the first of which is not timed
@@ -119,6 +126,58 @@ def measure(label: str, modes: list[str], integrator: str, runs: int) -> dict[st
     return rows
 
 
+def call_time(function: Callable[..., Any], *addresses: int) -> float:
+    """Return how long a call takes [us], the median over fifty times twenty."""
+    spent = []
+    for _ in range(50):
+        began = clock()
+        for _ in range(20):
+            function(*addresses)
+        spent.append((clock() - began) / 20)
+    return 1e6 * float(np.median(spent))
+
+
+def profile(label: str, mode: str) -> Row:
+    """Return where the time of an installed model's step goes [us]."""
+    ours, native = Variant(label, mode, "Euler"), Variant(label, None, "Euler")
+    for control in excitations(ours.model.nu, RUN, BLOCK * ours.model.opt.timestep, 0):
+        ours.block(control)
+    mujoco.mj_forward(ours.model, ours.data)
+    pulled = np.any(ours.data.xfrc_applied != 0.0, axis=1)
+    times: list[list[float]] = []
+    for _ in range(4 * RUN):
+        native.follow(ours.data)
+        native.data.xfrc_applied[:] = 0.0
+        spent = [native.block(ours.data.ctrl)]
+        native.follow(ours.data)
+        native.data.xfrc_applied[pulled] = 1e-200
+        times.append([*spent, native.block(ours.data.ctrl), ours.block(ours.data.ctrl)])
+    without, loaded, whole = np.array(times).T
+    mujoco.mj_forward(ours.model, ours.data)
+    block = int(np.asarray(ours.data.plugin_data)[0])
+    head = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
+    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+    compute, advance = kind(int(head[bk.STAGE])), kind(int(head[bk.FINISH]))
+    nothing = kind(ctypes.cast(library().mj_version, ctypes.c_void_p).value or 0)
+    here = block, ours.model._address, ours.data._address
+
+    def step(*addresses: int) -> None:
+        compute(*addresses)
+        advance(*addresses)
+
+    call = call_time(nothing, *here)
+    first = call_time(compute, *here) - call
+    row = {
+        "native": float(np.median(without)),
+        "step": float(np.median(whole)),
+        "compute": first,
+        "advance": max(call_time(step, *here) - first - 2.0 * call, 0.0),
+        "xfrc_applied": float(np.median(loaded - without)),
+        "bodies": int(pulled.sum()),
+    }
+    return row | {"MuJoCo": row["step"] - row["compute"] - row["advance"] - row["xfrc_applied"]}
+
+
 def print_row(label: str, mode: str, row: Row, native: Row) -> None:
     """Print a mode beside the native model."""
     low, high = row["quartiles"]
@@ -151,6 +210,7 @@ def main() -> int:
     parser.add_argument(
         "--runs", type=int, default=6, help=f"runs of {RUN} blocks of {BLOCK} steps (default 6)"
     )
+    parser.add_argument("--profile", action="store_true", help="say where the time of the first mode goes")
     parser.add_argument(
         "--target", action="store_true", help="exit with 1 where a mode is slower than the native model"
     )
@@ -158,6 +218,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.runs < 1:
         parser.error(f"--runs must be at least 1, not {options.runs}")
+    if options.profile and options.modes[0] == SYSTEM:
+        parser.error(f"--profile is of the plugin, not of {SYSTEM}")
     if options.json and not options.json.resolve().parent.is_dir():
         parser.error(f"--json: there is no folder {options.json.resolve().parent}")
     print(f"mjwrap {mw.__version__}, MuJoCo {mujoco.__version__}, {options.integrator}; ", end="")
@@ -172,8 +234,17 @@ def main() -> int:
             return 2
         for mode in options.modes:
             print_row(label, mode, found[mode], found["native"])
+    parts: dict[str, Row] = {}
+    if options.profile:
+        names = ("native", "step", "MuJoCo", "compute", "advance", "xfrc_applied", "bodies")
+        print(f"\n{'':10}" + "".join(f"{name:>14}" for name in names))
+        for label in options.models:
+            parts[label] = profile(label, options.modes[0])
+            print(f"{label:10}" + "".join(f"{parts[label][name]:14.4g}" for name in names), flush=True)
     if options.json:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        options.json.write_text(
+            json.dumps(rows | ({"profile": parts} if parts else {}), indent=1) + "\n", encoding="utf-8"
+        )
     timed = [found[mode] for found in rows.values() for mode in options.modes]
     lost = any(row["lost"] for found in rows.values() for row in found.values())
     slow = options.target and any(row["ratio"] > 1.0 for row in timed)

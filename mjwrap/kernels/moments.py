@@ -10,18 +10,8 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.coupling import R_LO, R_MUSCLE, end_body
-from mjwrap.kernels.segments import G_A, G_B, G_E, G_FAR, G_NEAR
-
-
-@jit
-def _moment(seg, j, column, subtree_com, root):
-    """Return the moment of segment j's unit vector, acting at its end in `column`, about a tree's centre of mass."""
-    rx = seg[j, column] - subtree_com[root, 0]
-    ry = seg[j, column + 1] - subtree_com[root, 1]
-    rz = seg[j, column + 2] - subtree_com[root, 2]
-    ex, ey, ez = seg[j, G_E], seg[j, G_E + 1], seg[j, G_E + 2]
-    return ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
+from mjwrap.kernels.coupling import R_LO, R_MUSCLE, ends, moment
+from mjwrap.kernels.segments import G_A, G_B, G_E
 
 
 @jit
@@ -31,14 +21,13 @@ def add_row(
     """Add weight dl/dq of route c to row (nv,) [m per unit of the coordinate] (17)."""
     first = routes[c, R_LO] + c
     for j in range(first, first + seg_count[c]):
-        near = end_body(routes, links, c, int(seg[j, G_NEAR]))
-        far = end_body(routes, links, c, int(seg[j, G_FAR]))
+        near, far = ends(c, j, routes, links, seg[j])
         a, b = last_dof[near], last_dof[far]
         if a == b:
             continue
         ex, ey, ez = seg[j, G_E], seg[j, G_E + 1], seg[j, G_E + 2]
-        ax, ay, az = _moment(seg, j, G_A, subtree_com, body_rootid[near])
-        bx, by, bz = _moment(seg, j, G_B, subtree_com, body_rootid[far])
+        ax, ay, az = moment(seg[j], G_A, subtree_com[body_rootid[near]])
+        bx, by, bz = moment(seg[j], G_B, subtree_com[body_rootid[far]])
         while a != b:
             if a > b:
                 row[a] -= weight * (
