@@ -19,6 +19,7 @@ import numpy as np
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.muscles import ActuatorForce
 from mjwrap.plugin.callbacks.drawing import THIN, THINNED
+from mjwrap.plugin.resting import wake_actuators
 
 _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_ACTUATOR)
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
@@ -126,7 +127,8 @@ def drop_placeholders(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -
 
 
 def restore_placeholders(model: mujoco.MjModel) -> None:
-    """Give tendons their stops back."""
+    """Give tendons their stops back, and muscle actuators that rest on them their curves."""
+    wake_actuators(model)
     for tendon in np.flatnonzero(model.tendon_num == 0):
         first = int(model.tendon_adr[tendon])
         model.tendon_num[tendon] = int(model.wrap_prm[first])

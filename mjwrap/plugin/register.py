@@ -30,7 +30,6 @@ from mjwrap.plugin.image import block_image, state_size
 from mjwrap.plugin.library import MjpPlugin, library, saved_model
 from mjwrap.plugin.offsets import offsets, verify_plugin_fields
 from mjwrap.plugin.placeholders import restore_placeholders
-from mjwrap.plugin.resting import wake_actuators
 from mjwrap.plugin.viewing import drawing
 from mjwrap.takeover import Takeover
 
@@ -98,7 +97,6 @@ def hush_to_silence(model: mujoco.MjModel) -> None:
 def read_plan(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Plan, list[MuscleDeclaration]]:
     """Return the named muscles of a model and their arrays; `ModelError` where one is missing."""
     hush_to_silence(model)
-    wake_actuators(model)
     restore_placeholders(model)
     with Takeover(model).suspended():
         found = read_declarations(model, transmission=mode == TRANSMISSION).muscles
