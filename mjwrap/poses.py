@@ -53,7 +53,7 @@ def read_couplings(model: mujoco.MjModel) -> list[Coupling]:
 
 
 class PoseMaker:
-    """Makes poses of a model around a base pose qpos (nq,)."""
+    """Makes poses of a model around a base pose qpos (nq,), in which coupled joints are put where they follow."""
 
     def __init__(self, model: mujoco.MjModel, base: Array, seed: int = 0, number: int = 0) -> None:
         self.model = model
@@ -61,6 +61,7 @@ class PoseMaker:
         self.number = number
         self.rng = np.random.default_rng(seed)
         self._couplings = read_couplings(model)
+        self._follow(self.base, np.zeros(model.nv), -1)
 
     def joints(self) -> list[int]:
         """Return the joints that can be swept: all but free ones."""

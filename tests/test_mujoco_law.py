@@ -38,10 +38,11 @@ def tension(law: mw.MuJoCoMuscle, a: float, length: float, speed: float) -> floa
 
 
 def test_the_kernel_is_mujocos_gain_and_bias() -> None:
-    """Over all branches of the curves: lengths past both ends, speeds past both limits."""
+    """Over all branches of the curves: lengths past both ends, speeds past both limits; a bias of its own."""
     rng = np.random.default_rng(8)
     branches = set()
     for _ in range(3000):
+        other = random_prm(rng)
         prm, gear, acc0 = random_prm(rng), rng.uniform(0.2, 4), rng.uniform(0.1, 30)
         short = rng.uniform(0.05, 0.4) * gear
         bounds = short, short + rng.uniform(0.05, 0.3) * gear
@@ -51,10 +52,10 @@ def test_the_kernel_is_mujocos_gain_and_bias() -> None:
         a = rng.uniform(0, 1)
         given = np.array(bounds), acc0, np.array(prm)
         gain = mujoco.mju_muscleGain(gear * length, gear * speed, *given)
-        bias = mujoco.mju_muscleBias(gear * length, *given)
+        bias = mujoco.mju_muscleBias(gear * length, *given[:2], np.array(other))
         expected = -gear * (gain * a + bias)
-        scale = gear * (prm[2] if prm[2] > 0 else prm[3] / acc0)
-        law = mw.MuJoCoMuscle(prm, bounds, acc0, gear)
+        scale = gear * max(p[2] if p[2] > 0 else p[3] / acc0 for p in (prm, other))
+        law = mw.MuJoCoMuscle(prm, bounds, acc0, gear, passive=other)
         assert tension(law, a, length, speed) == pytest.approx(expected, rel=ROUNDING, abs=ROUNDING * scale)
         branches.add((gain == 0.0, bias == 0.0, expected > scale))
     assert branches >= {(False, False, False), (True, True, False), (True, False, True), (False, True, False)}
@@ -151,6 +152,8 @@ def test_taken_over_muscles_pull_as_native_ones() -> None:
     ("changes", "message"),
     [
         ({"prm": PRM[:8]}, "prm must be nine numbers"),
+        ({"passive": PRM[:8]}, "passive prm must be nine numbers"),
+        ({"passive": (1.05, 0.75, *PRM[2:])}, "passive range must be above 1.05, not 0.75"),
         *(({"prm": (*PRM[:k], math.nan, *PRM[k + 1 :])}, "must be finite, not nan") for k in range(9)),
         ({"prm": (1.05, 0.75, *PRM[2:])}, "range must be above 1.05, not 0.75"),
         ({"prm": (*PRM[:6], 0.0, *PRM[7:])}, "vmax must be finite and positive"),

@@ -62,6 +62,26 @@ def test_data_outlives_its_model_and_its_origin() -> None:
         np.testing.assert_array_equal(state_of(left), state_of(expected))
 
 
+@pytest.mark.parametrize("name", ["qpos", "qvel", "qacc_warmstart", "act", "ctrl"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
+def test_a_state_that_blows_up_is_reset_as_a_whole(
+    name: str, bad: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo resets it in the middle of a step; what the muscles knew goes with it."""
+    monkeypatch.chdir(tmp_path)  # for MuJoCo's log
+    model = install(spec_of(SCENES["elastic arm"]))
+    data, fresh = moving(model), mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=20)
+    getattr(data, name)[:] = bad
+    mujoco.mj_forward(model, data)
+    mujoco.mj_step(model, data, nstep=3)
+    mujoco.mj_resetData(model, data)
+    for each in (data, fresh):
+        mujoco.mj_step(model, each, nstep=5)
+    np.testing.assert_array_equal(state_of(data), state_of(fresh))
+    assert np.isfinite(state_of(data)).all()
+
+
 def test_threads_step_while_others_load() -> None:
     model = arm()
     reference = moving(model)

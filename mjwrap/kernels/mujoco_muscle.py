@@ -10,6 +10,7 @@ from __future__ import annotations
 from mjwrap.kernels._jit import jit
 
 CODE = 1
+RANGE, ACC0, GEAR, LIMITS, PASSIVE = 9, 11, 12, 13, 15  # first columns of the groups above
 MINVAL = 1e-15  # mjMINVAL
 
 

@@ -14,6 +14,7 @@ class Node:
     """One stop of a route: a via site, or the surface in a geom's frame with, perhaps, a site as hint at its side.
 
     inside: the string is held to the solid, as by a side site inside, rather than kept out of it.
+    sizes: the numeric that gives the surface its sizes, -1 where the geom does.
     """
 
     site: int = -1
@@ -21,6 +22,7 @@ class Node:
     hint_site: int = -1
     surface: Surface | None = None
     inside: bool = False
+    sizes: int = -1
 
 
 @dataclass(frozen=True)

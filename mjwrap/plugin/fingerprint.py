@@ -16,13 +16,14 @@ _LEFT_OUT = ("mesh_", "tex_", "mat_", "skin_", "hfield_", "bvh_", "oct_", "flex"
 
 
 @functools.cache
-def _layout() -> ModelBuffer:
+def buffer_layout() -> ModelBuffer:
+    """Return where mjModel keeps its arrays, found once."""
     return model_buffer()
 
 
 def fingerprint(address: int) -> bytes | None:
     """Return the hash of the model at an address, or None where its arrays do not lie as they should."""
-    layout = _layout()
+    layout = buffer_layout()
     start = ctypes.c_uint64.from_address(address + layout.buffer).value
     end = start + ctypes.c_int64.from_address(address + layout.nbuffer).value
     places = sorted(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels import coupling, layout, segments
+from mjwrap.kernels import coupling, layout, mujoco_muscle, segments
+from mjwrap.kernels.muscle import MUJOCO
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.plan import Plan
 from mjwrap.plugin.callbacks import block as bk
@@ -18,6 +20,7 @@ from mjwrap.plugin.callbacks.hooks import Entries
 from mjwrap.plugin.offsets import offsets
 from mjwrap.plugin.transmission import transmission_part
 from mjwrap.plugin.viewing import drawing
+from mjwrap.plugin.watch import Watch, watch
 
 Words = NDArray[np.int64]
 
@@ -39,13 +42,21 @@ def state_size(plan: Plan) -> int:
     return numbers
 
 
-def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> dict[str, Any]:
+def _arrays(
+    model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration], watched: Watch
+) -> dict[str, Any]:
     n, nodes, routes = plan.n, len(plan.node), len(plan.routes)
     sketch = drawing()
     groups = [int(model.actuator_group[m.actuator]) if m.actuator >= 0 else -1 for m in muscles]
     groups = [bk.SILENT if out >= 0 else group for out, group in zip(plan.output, groups, strict=True)]
     arrays: dict[str, Any] = {name: getattr(plan, name) for name in bk.ARRAYS if hasattr(plan, name)}
+    params = np.array(plan.params)
+    for m, (muscle, law) in enumerate(zip(muscles, plan.law, strict=True)):
+        if muscle.actuator >= 0 and law == MUJOCO:  # its limits as the marks that `follow.py` compares
+            marks = model.actuator_gainprm[muscle.actuator, -1], model.actuator_biasprm[muscle.actuator, -1]
+            params[m, mujoco_muscle.LIMITS : mujoco_muscle.LIMITS + 2] = marks
     arrays |= {
+        "params": params,
         "group": np.array(groups, dtype=np.int64),
         "body_rootid": np.array(model.body_rootid, dtype=np.int64),
         "loaded": loaded_bodies(plan),
@@ -65,6 +76,8 @@ def _arrays(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration])
         "labels": np.array([m.name.encode()[: dr.LABEL - 1] for m in muscles], dtype=f"S{dr.LABEL}"),
         "blank": np.frombuffer(sketch.blank if sketch else b"", dtype=np.uint8),
     }
+    for name, value in watched._asdict().items():
+        arrays[name] = np.frombuffer(value, dtype=np.uint8) if isinstance(value, bytes) else value
     arrays |= {name: np.zeros((model.nbody, 6)) for name in ("wrench", "others", "mine", "total")}
     return {name: arrays.get(name, np.zeros(n)) for name in bk.ARRAYS}
 
@@ -76,8 +89,10 @@ def block_image(
     muscles: list[MuscleDeclaration],
     entries: Entries,
     free: int,
+    rebuild: int,
 ) -> bytes:
-    """Return the block for an instance of the plugin; free: address of the function that gives its memory back."""
+    """Return the block for an instance of the plugin; free, rebuild: addresses of functions in `register.py`."""
+    watched = watch(model, plan, muscles)
     head = np.zeros(bk.HEAD, dtype=np.int64)
     head[bk.MUSCLES], head[bk.NODES], head[bk.ROUTES] = plan.n, len(plan.node), len(plan.routes)
     head[bk.BODIES], head[bk.SITES], head[bk.GEOMS] = model.nbody, model.nsite, model.ngeom
@@ -87,6 +102,9 @@ def block_image(
     head[bk.STAGE], head[bk.FINISH], head[bk.FREE] = entries.stage.address, entries.finish.address, free
     head[bk.RUNGE_KUTTA] = int(mujoco.mjtIntegrator.mjINT_RK4)
     head[bk.NO_ACTUATION] = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    head[bk.INSTANCE], head[bk.REBUILD], head[bk.BOUND] = instance, rebuild, len(watched.bound)
+    head[bk.PLAIN], head[bk.DERIVED] = len(watched.plain), len(watched.derived)
+    head[bk.STRUCTURE] = len(watched.structure)
     fields = offsets().data | offsets().model
     head[bk.TIME : bk.TIME + len(bk.FIELDS)] = [fields[name] for name in bk.FIELDS]
     sketch = drawing()
@@ -94,10 +112,34 @@ def block_image(
         head[bk.DRAW] = entries.draw.address
         head[bk.HEAD - len(bk.DRAWING) :] = sketch.words
     pieces, here = [], 8 * bk.HEAD
-    for place, array in enumerate(_arrays(model, plan, muscles).values(), start=bk.A_ROUTES):
+    for place, array in enumerate(_arrays(model, plan, muscles, watched).values(), start=bk.A_ROUTES):
         head[place] = here
         piece = np.ascontiguousarray(array).tobytes()
         pieces.append(piece + bytes(-len(piece) % 8))
         here += len(pieces[-1])
     head[bk.BYTES] = here
     return head.tobytes() + b"".join(pieces)
+
+
+# what a block holds of the model; the states in its rows of nodes are read from plugin_state afterwards
+_CONSTANT = (
+    "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
+    "weights", "params", "ctrl_low", "ctrl_high", "times", "node", "bound", "drives", "transmission",
+    "tendon", "actuator", "labels",
+)  # fmt: skip
+
+
+def renew(block: int, image: bytes) -> bool:
+    """Give a living block the numbers of a new image, and keep its state; return whether both have one layout."""
+    head = np.frombuffer(image, dtype=np.int64, count=bk.HEAD)
+    living = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
+    same = head == living
+    same[bk.MODEL] = True
+    if not same.all():
+        return False
+    for name in _CONSTANT:
+        which = bk.ARRAYS.index(name)
+        first = int(head[bk.A_ROUTES + which])
+        end = int(head[bk.A_ROUTES + which + 1]) if which + 1 < len(bk.ARRAYS) else len(image)
+        ctypes.memmove(block + first, image[first:end], end - first)
+    return True

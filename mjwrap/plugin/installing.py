@@ -7,12 +7,13 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import read_declarations, read_model
 from mjwrap.muscles import ActuatorForce
 from mjwrap.plugin import register as reg
-from mjwrap.plugin.image import state_size
+from mjwrap.plugin.image import loaded_bodies, state_size
 from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders, show_placeholder
 from mjwrap.plugin.resting import rest_actuators
 from mjwrap.plugin.transmission import check_room
@@ -71,6 +72,7 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     check_room(model, plan, muscles)
     if drawing():
         hide_placeholders(spec, muscles)
+    _keep_awake(spec, model, loaded_bodies(plan))
     _add_instance(spec, reg.configuration(names, state_size(plan), mode))
     model = _compile(spec)
     if not keep_tendons:
@@ -124,6 +126,15 @@ def _wake(element: mujoco.MjsActuator | None) -> None:
     limited = high < mujoco.mjMAXVAL
     element.gainprm[-1] = element.biasprm[-1] = 0.0
     element.forcelimited, element.forcerange = limited, (low, high) if limited else (0.0, 0.0)
+
+
+def _keep_awake(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: NDArray[np.int64]) -> None:
+    """Let no tree sleep that a muscle pulls, unless its sleep policy is given: as MuJoCo does for its own actuators."""
+    trees = {int(tree) for tree in model.body_treeid[bodies] if tree >= 0}
+    for element in spec.bodies[1:]:
+        tree, above = (int(model.body_treeid[b]) for b in (element.id, element.parent.id))
+        if tree in trees and tree != above and element.sleep == mujoco.mjtSleepPolicy.mjSLEEP_AUTO:
+            element.sleep = mujoco.mjtSleepPolicy.mjSLEEP_NEVER
 
 
 def _add_instance(spec: mujoco.MjSpec, config: dict[str, str]) -> None:

@@ -24,10 +24,12 @@ from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf import MuscleDeclaration, read_declarations
 from mjwrap.mjcf.names import PLUGIN_INSTANCE as INSTANCE
 from mjwrap.plan import Plan, build_plan
+from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries, compile_hooks
+from mjwrap.plugin.copies import copy_of
 from mjwrap.plugin.fingerprint import fingerprint
-from mjwrap.plugin.image import block_image, state_size
-from mjwrap.plugin.library import MjpPlugin, library, saved_model
+from mjwrap.plugin.image import block_image, renew, state_size
+from mjwrap.plugin.library import MjpPlugin, library
 from mjwrap.plugin.offsets import offsets, verify_plugin_fields
 from mjwrap.plugin.placeholders import restore_placeholders
 from mjwrap.plugin.viewing import drawing
@@ -46,9 +48,11 @@ HUSHED = (0.0, 1e-12)
 _WORD, _INT = ctypes.c_void_p, ctypes.c_int
 _NSTATE = ctypes.CFUNCTYPE(_INT, _WORD, _INT)
 _INIT = ctypes.CFUNCTYPE(_INT, _WORD, _WORD, _INT)
+_REBUILD = ctypes.CFUNCTYPE(None, _WORD, _WORD, ctypes.c_int64)
 _NOTHING = ctypes.CFUNCTYPE(None)
 
 _LOCK = threading.Lock()
+_COPY = threading.Lock()  # held while the copy of a model is read
 _IMAGES: OrderedDict[tuple[bytes | None, int], bytes] = OrderedDict()
 _here = threading.local()  # .reading: init is reading a copy of the model; .error: why init failed last
 
@@ -118,20 +122,20 @@ def _image(address: int, instance: int) -> bytes:
         if key in _IMAGES:
             _IMAGES.move_to_end(key)
             return _IMAGES[key]
-    saved = saved_model(address)
-    _here.reading = True
-    try:
-        model = mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": saved.raw})
-        claim = claim_of(address, instance)
-        plan, muscles = read_plan(model, claim.muscles, claim.mode)
-    finally:
-        _here.reading = False
-    if state_size(plan) != claim.numbers:
-        raise ModelError(
-            f"the paths of the engine plugin's muscles have changed since mjwrap.install: their state needs "
-            f"{state_size(plan)} numbers and has {claim.numbers}; call install again"
-        )
-    image = block_image(model, instance, plan, muscles, _entries(), _free())
+    with _COPY:
+        _here.reading = True
+        try:
+            model = copy_of(address)
+            claim = claim_of(address, instance)
+            plan, muscles = read_plan(model, claim.muscles, claim.mode)
+        finally:
+            _here.reading = False
+        if state_size(plan) != claim.numbers:
+            raise ModelError(
+                f"the paths of the engine plugin's muscles have changed since mjwrap.install: their state needs "
+                f"{state_size(plan)} numbers and has {claim.numbers}; call install again"
+            )
+        image = block_image(model, instance, plan, muscles, _entries(), _free(), _rebuilder())
     if key[0] is None:
         return image
     with _LOCK:
@@ -192,10 +196,32 @@ def _init(model: int, data: int, instance: int) -> int:
         image = _image(model, instance)
         block = _raw_malloc(len(image))
         ctypes.memmove(block, image, len(image))
+        ctypes.c_int64.from_address(block + 8 * bk.MODEL).value = model
         slot.value = block
     except Exception as error:
         return _failed(error)
     return 0
+
+
+def _rebuild(block: int, model: int, instance: int) -> None:
+    """Make a block's numbers those of a changed model, or leave them as they are and say why."""
+    try:
+        if not renew(block, _image(model, instance)):
+            raise ModelError(
+                "its muscles are others than those that the mjData was made for; make a new mjData"
+            )
+    except Exception as error:
+        print(
+            f"mjwrap: changes in the model are not followed, its muscles stay as they were: {error}",
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
+
+
+@functools.cache
+def _rebuilder() -> int:
+    function = _REBUILD(_rebuild)
+    _for_ever(function)
+    return _address(function)
 
 
 def _for_ever(thing: Any) -> None:

@@ -26,6 +26,9 @@ FIELDS = (
 ) = range(16, 16 + len(FIELDS))  # fmt: skip
 # MuJoCo's codes: the integrator RK4, the bit of `disableflags` that switches actuation off
 RUNGE_KUTTA, NO_ACTUATION = 32, 33
+# what `follow.py` needs: the model last followed, its instance, the function that builds the numbers anew, and how many
+# regions it watches
+MODEL, INSTANCE, REBUILD, PLAIN, DERIVED, STRUCTURE, BOUND = 34, 35, 36, 37, 38, 39, 40
 # where the arrays start
 ARRAYS = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
@@ -34,6 +37,7 @@ ARRAYS = (
     "activation", "fiber", "length", "velocity", "tension", "next_activation", "next_fiber", "status",
     "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost", "transmission",
     "tendon", "actuator", "labels", "blank",
+    "plain", "plain_seen", "derived", "derived_seen", "structure", "structure_seen", "bound", "drives", "pointers",
 )  # fmt: skip
 (
     A_ROUTES, A_LINKS, A_LAW, A_SOURCE, A_INDEX, A_CONTROL, A_FORM, A_GROUP, A_BODY_ROOTID, A_LOADED,
@@ -42,7 +46,8 @@ ARRAYS = (
     A_ACTIVATION, A_FIBER, A_LENGTH, A_VELOCITY, A_TENSION, A_NEXT_ACTIVATION, A_NEXT_FIBER, A_STATUS,
     A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST, A_TRANSMISSION,
     A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
-) = range(40, 40 + len(ARRAYS))  # fmt: skip
+    A_PLAIN, A_PLAIN_SEEN, A_DERIVED, A_DERIVED_SEEN, A_STRUCTURE, A_STRUCTURE_SEEN, A_BOUND, A_DRIVES, A_POINTERS,
+) = range(48, 48 + len(ARRAYS))  # fmt: skip
 # how to draw: byte offsets in MuJoCo's structs (of an option: of its byte), the size of a mjvGeom, MuJoCo's codes, the
 # address of a function that warns and of what it says
 DRAWING = (
@@ -60,7 +65,7 @@ DRAWING = (
     "code.dynamic", "code.decor", "code.unknown",
     "warn", "full",
 )  # fmt: skip
-_FIRST = 40 + len(ARRAYS)
+_FIRST = 48 + len(ARRAYS)
 (
     D_MAXGEOM, D_NGEOM, D_GEOMS, D_STATUS,
     D_LABEL, D_TENDON, D_ACTUATOR, D_ACTIVATION, D_TRANSPARENT,

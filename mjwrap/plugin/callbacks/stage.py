@@ -19,6 +19,7 @@ from mjwrap.kernels.muscle import PARAMS
 from mjwrap.kernels.wrenches import body_wrenches, put, take_back
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.follow import follow
 from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word, words
 from mjwrap.plugin.callbacks.transmission import transmit
 
@@ -245,6 +246,7 @@ def stage(block, model, data):
     else:
         ahead = step
     if since == 0.0:
+        follow(block, model)
         _load(block, state)
     off, group = flags(block + word(block + 8 * bk.A_OFF), (n,)), _ints(block, bk.A_GROUP, (n,))
     switched = half(model + word(block + 8 * bk.DISABLEACTUATOR))

@@ -1,0 +1,174 @@
+"""Following the numbers of a living mjModel: what changes in it counts from the next evaluation on.
+
+MuJoCo's own muscle law and the limits of controls are compared with the model where the kernels read them, which costs
+no memory but the model's; `drives` says which actuator is whose. Of the rest the block keeps a copy of what the
+muscles' arrays were made from, in lists of regions (offset of the pointer in mjModel, first byte, how many):
+
+- plain: doubles that stand in the muscles' arrays as they are, copied there by the rows of `bound`;
+- derived: doubles that mean something else there: then Python builds the arrays anew;
+- structure: bytes of ids and kinds, looked at only when another model comes, as in `rollout` over a list of models.
+
+`mjwrap/plugin/watch.py` makes the lists.
+"""
+
+from __future__ import annotations
+
+from mjwrap.kernels import mujoco_muscle as law
+from mjwrap.kernels.muscle import PARAMS
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.memory import call, octets, reals, store_word, word, words
+
+# columns of a list of regions, and of `bound`: as a region, then which array of the block, and which number in it
+POINTER, FIRST, COUNT, ARRAY, NUMBER = 0, 1, 2, 3, 4
+REGION, BINDING = 3, 5
+# columns of `drives` (n, 4): a muscle's actuator and its output, -1 where its law is not MuJoCo's; what is followed
+D_ACTUATOR, D_OUTPUT, D_FOLLOWS, DRIVE = 0, 1, 2, 4
+BIAS, CONTROL = 1, 2  # bits: biasprm; the limits of its control
+# `pointers` (6, 2): offsets in mjModel of the pointers to these arrays, and how many numbers they hold
+POINTERS = (
+    "actuator_gainprm", "actuator_biasprm", "actuator_lengthrange", "actuator_acc0", "actuator_gear",
+    "actuator_ctrlrange",
+)  # fmt: skip
+PRM, GEARS = 10, 6  # numbers in a row of gainprm and biasprm, and of gear
+
+
+@jit
+def _table(block, which, rows, columns):
+    return words(block + word(block + 8 * which), (word(block + 8 * rows), columns))
+
+
+@jit
+def _differs(block, which, seen, rows, model):
+    """Return whether doubles in a list of regions have changed."""
+    regions = _table(block, which, rows, REGION)
+    at = block + word(block + 8 * seen)
+    for r in range(regions.shape[0]):
+        count = regions[r, COUNT]
+        live = words(word(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
+        kept = words(at, (count,))
+        changes = 0
+        for i in range(count):
+            changes |= live[i] ^ kept[i]
+        if changes != 0:
+            return True
+        at += 8 * count
+    return False
+
+
+@jit
+def _living(block, model, which):
+    """Return an array of the model in `pointers`, flat, as words."""
+    pointers = words(block + word(block + 8 * bk.A_POINTERS), (6, 2))
+    return words(word(model + pointers[which, 0]), (pointers[which, 1],))
+
+
+@jit
+def _match(live, at, mine, to, count, write):
+    """Return in which bits words of two arrays differ, or copy them."""
+    changes = 0
+    for i in range(count):
+        if write:
+            mine[to + i] = live[at + i]
+        else:
+            changes |= live[at + i] ^ mine[to + i]
+    return changes
+
+
+@jit
+def _laws(block, model, write):
+    """Compare MuJoCo's muscle laws and the limits of controls with the model's; copy them, or say whether they differ.
+
+    Limits of force are the marks that `Takeover` leaves behind gainprm and biasprm; all numbers as words, to the bit.
+    """
+    n = word(block + 8 * bk.MUSCLES)
+    drives = words(block + word(block + 8 * bk.A_DRIVES), (n, DRIVE))
+    control = words(block + word(block + 8 * bk.A_CONTROL), (n,))
+    params = words(block + word(block + 8 * bk.A_PARAMS), (n * PARAMS,))
+    low = words(block + word(block + 8 * bk.A_CTRL_LOW), (n,))
+    high = words(block + word(block + 8 * bk.A_CTRL_HIGH), (n,))
+    gain, bias, lengths = _living(block, model, 0), _living(block, model, 1), _living(block, model, 2)
+    acc0, gear, limits = _living(block, model, 3), _living(block, model, 4), _living(block, model, 5)
+    changes = 0
+    for m in range(n):
+        a, o, follows = drives[m, D_ACTUATOR], drives[m, D_OUTPUT], drives[m, D_FOLLOWS]
+        if follows & CONTROL != 0:
+            changes |= _match(limits, 2 * control[m], low, m, 1, write)
+            changes |= _match(limits, 2 * control[m] + 1, high, m, 1, write)
+        if a < 0:
+            continue
+        row = m * PARAMS
+        changes |= _match(gain, PRM * a, params, row, 9, write)
+        changes |= _match(gain, PRM * a + 9, params, row + law.LIMITS, 1, write)
+        changes |= _match(bias, PRM * a + 9, params, row + law.LIMITS + 1, 1, write)
+        changes |= _match(lengths, 2 * o, params, row + law.RANGE, 2, write)
+        changes |= _match(gear, GEARS * o, params, row + law.GEAR, 1, write)
+        if follows & BIAS != 0:
+            changes |= _match(bias, PRM * a, params, row + law.PASSIVE, 4, write)
+            changes |= _match(bias, PRM * a + 5, params, row + law.PASSIVE + 4, 1, write)
+            changes |= _match(bias, PRM * a + 7, params, row + law.PASSIVE + 5, 1, write)
+        changes |= _match(acc0, o, params, row + law.ACC0, 1, write)
+    return changes != 0
+
+
+@jit
+def _other_structure(block, model):
+    """Return whether another model has other ids or kinds."""
+    regions = _table(block, bk.A_STRUCTURE, bk.STRUCTURE, REGION)
+    at = block + word(block + 8 * bk.A_STRUCTURE_SEEN)
+    for r in range(regions.shape[0]):
+        count = regions[r, COUNT]
+        live = octets(word(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
+        kept = octets(at, (count,))
+        for i in range(count):
+            if live[i] != kept[i]:
+                return True
+        at += count
+    return False
+
+
+@jit
+def _note(block, which, seen, rows, size, model):
+    """Keep what the model holds now in a list of regions; size [bytes] of what they count."""
+    regions = _table(block, which, rows, REGION)
+    at = block + word(block + 8 * seen)
+    for r in range(regions.shape[0]):
+        count = size * regions[r, COUNT]
+        live = octets(word(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
+        kept = octets(at, (count,))
+        for i in range(count):
+            kept[i] = live[i]
+        at += count
+
+
+@jit
+def _bind(block, model):
+    """Copy the plain numbers of the model to where the kernels read them."""
+    bound = _table(block, bk.A_BOUND, bk.BOUND, BINDING)
+    for r in range(bound.shape[0]):
+        count = bound[r, COUNT]
+        live = reals(word(model + bound[r, POINTER]) + bound[r, FIRST], (count,))
+        place = reals(block + word(block + 8 * bound[r, ARRAY]) + 8 * bound[r, NUMBER], (count,))
+        for i in range(count):
+            place[i] = live[i]
+
+
+@jit
+def follow(block, model):
+    """Make the muscles' arrays those of the model as it is now."""
+    other = word(block + 8 * bk.MODEL) != model
+    laws = _laws(block, model, False)
+    plain = _differs(block, bk.A_PLAIN, bk.A_PLAIN_SEEN, bk.PLAIN, model)
+    derived = _differs(block, bk.A_DERIVED, bk.A_DERIVED_SEEN, bk.DERIVED, model)
+    if not (laws or plain or derived or other):
+        return
+    store_word(block + 8 * bk.MODEL, model)
+    if derived or (other and _other_structure(block, model)):
+        call(word(block + 8 * bk.REBUILD), block, model, word(block + 8 * bk.INSTANCE))
+        _note(block, bk.A_DERIVED, bk.A_DERIVED_SEEN, bk.DERIVED, 8, model)
+        _note(block, bk.A_STRUCTURE, bk.A_STRUCTURE_SEEN, bk.STRUCTURE, 1, model)
+    if laws:
+        _laws(block, model, True)
+    if plain:
+        _bind(block, model)
+        _note(block, bk.A_PLAIN, bk.A_PLAIN_SEEN, bk.PLAIN, 8, model)
