@@ -39,6 +39,10 @@ ENVIRONMENT["PYTHONPATH"] = str(BENCHMARKS.parent)
         ("bench_muscle.py", ["--step", "nan"], "--step must be above 0"),
         ("bench_muscle.py", ["--json", "no/such/x.json"], "there is no folder"),
         ("energy.py", ["--seconds", "nan"], "--seconds must be between"),
+        ("plugin_soak.py", ["--loads", "5"], "show nothing"),
+        ("plugin_hostile.py", ["--scenes", "none"], "invalid choice: 'none'"),
+        ("upgrade_models.py", ["--samples", "2"], "0, or 3 at least"),
+        ("upgrade_models.py", ["no/such.xml"], "no/such.xml"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_runs(
@@ -157,3 +161,45 @@ def test_a_step_that_does_not_balance_has_failed(monkeypatch: pytest.MonkeyPatch
 
     assert bench.failures(motion, wrong, 2e-3)[0] == 4
     assert bench.failures(motion, bench.run_elastic, 2e-3)[0] == 0
+
+
+JUMPING = """
+<mujoco>
+  <worldbody>
+    <geom name="ball" type="sphere" size=".03" contype="0" conaffinity="0"/>
+    <site name="side" pos="0 0 .05"/>
+    <site name="a" pos="-.1 0 .01"/>
+    <body><joint name="slide" type="slide" axis="0 0 1" range="-.08 .08" limited="true" damping="5"/>
+      <geom size=".005" mass="1" contype="0" conaffinity="0"/><site name="b" pos=".1 .002 0"/></body>
+  </worldbody>
+  <tendon>
+    <spatial name="t"><site site="a"/><geom geom="ball" sidesite="side"/><site site="b"/></spatial>
+    <spatial name="u"><site site="a"/><geom geom="ball" sidesite="a"/><site site="b"/></spatial>
+  </tendon>
+  <actuator>
+    <muscle name="m" tendon="t" lengthrange=".1 .3" force="10"/>
+    <motor name="o" tendon="u" ctrlrange="0 1" ctrllimited="true"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def test_the_table_of_models_tells_mujocos_jump_and_mjwraps_smooth_path(tmp_path: Path) -> None:
+    model, file = tmp_path / "jumping.xml", tmp_path / "rows.json"
+    model.write_text(JUMPING)
+    arguments = [str(model), "--seconds", "0.2", "--samples", "21", "--bases", "0", "--json", str(file)]
+    done = subprocess.run(
+        [sys.executable, str(BENCHMARKS / "upgrade_models.py"), *arguments],
+        cwd=tmp_path,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(file.read_text())
+    assert row["run"]["steps"] == row["run"]["wanted"] == 100
+    assert row["taken_over"] == row["wrapped"] == 1
+    assert {jump["program"] for jump in row["jumps"]} == {"MuJoCo"}
+    assert "of 1 wrapped tendons 1 jump in MuJoCo" in done.stdout
+    assert done.stdout.rstrip().endswith("| smooth |")

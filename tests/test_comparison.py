@@ -277,7 +277,9 @@ def test_coupled_joints_follow_and_tangents_are_derivatives() -> None:
 def test_a_joint_that_an_equality_holds_is_drawn_there() -> None:
     held = '<joint joint1="follower" polycoef=".1 0 0 0 0"/>'
     model = load(re.sub(r'<joint joint1="follower".*/>', held, COUPLED))
-    assert (PoseMaker(model, model.qpos0).random(20).qpos[:, 1] == 0.1).all()
+    poses = PoseMaker(model, model.qpos0)
+    assert model.qpos0[1] != poses.base[1] == 0.1
+    assert (poses.random(20).qpos[:, 1] == 0.1).all()
 
 
 def jump_at(place: float, length: float, slope: float) -> Callable[[float], tuple[float, float]]:
