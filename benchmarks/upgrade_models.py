@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
 import warnings
 from collections import Counter
 from dataclasses import asdict
@@ -49,13 +48,11 @@ def move(model: mujoco.MjModel, seconds: float, seed: int) -> Row:
     low, high = np.where(model.actuator_ctrllimited[:, None], model.actuator_ctrlrange, (0.0, 1.0)).T
     lost: Counter[str] = Counter()
     reasons: Counter[str] = Counter()
-    done, spent = 0, 0.0
+    done = 0
     for k in range(steps):
         if k % hold == 0:
             data.ctrl[:] = rng.uniform(low, high)
-        began = time.perf_counter()
         mujoco.mj_step(model, data)
-        spent += time.perf_counter() - began
         if unstable(data) or not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
             break
         done += 1
@@ -67,7 +64,6 @@ def move(model: mujoco.MjModel, seconds: float, seed: int) -> Row:
     return {
         "steps": done,
         "wanted": steps,
-        "us_per_step": 1e6 * spent / max(done, 1),
         "lost": lost,
         "reasons": reasons,
     }
@@ -134,8 +130,8 @@ def tell(row: Row) -> None:
     print(f"{row['taken_over']} muscles taken over, {len(row['native'])} native{': ' * bool(why)}{why}.")
     lost = "".join(f"; {name} at {count} steps" for name, count in run["lost"].most_common())
     print(
-        f"Run: {run['steps']} of {run['wanted']} steps (native {twin['steps']}), {run['us_per_step']:.0f} µs a step "
-        f"(native {twin['us_per_step']:.0f}), {sum(run['lost'].values())} times no path{lost}."
+        f"Run: {run['steps']} of {run['wanted']} steps (native {twin['steps']}), {sum(run['lost'].values())} times "
+        f"no path{lost}."
     )
     for reason, count in run["reasons"].items():
         print(f"Why: {reason} ({count}).")
