@@ -101,6 +101,9 @@ def _drive(lists: _Lists, plan: Plan, m: int, actuator: int) -> tuple[int, int, 
     """Return the row of `drives` of muscle m."""
     model = lists.model
     follows = CONTROL if actuator >= 0 and np.isfinite(plan.ctrl_high[m]) else 0
+    if actuator >= 0 and model.actuator_actearly[actuator]:  # mjwrap computes its next activation
+        lists.watch("actuator_dynprm", actuator, 1)
+        lists.watch("actuator_actrange", actuator, 1)
     if actuator < 0 or plan.law[m] != MUJOCO:
         return -1, -1, follows, 0
     output = int(model.actuator_outadr[actuator])
