@@ -23,12 +23,12 @@ MODELS = [
 ]
 
 
-def load(path: Path = MODELS[0], force: float = 0.0) -> mujoco.MjModel:
-    """Return a model in the plugin; force [N]: added to the muscles'."""
+def load(path: Path = MODELS[0], force: float = 0.0, mode: str = "wrench") -> mujoco.MjModel:
+    """Return a model in the plugin; force [N]: added to the muscles'; mode: as in `install`."""
     spec = mujoco.MjSpec.from_file(str(path))
     for actuator in spec.actuators:
         actuator.gainprm[2] += force
-    return mw.install(spec)
+    return mw.install(spec, mode)
 
 
 def moving(model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
@@ -43,10 +43,9 @@ def moving(model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
 
 
 def motion() -> list[mujoco.MjData]:
-    """All models under all integrators; looked at, copied, reset on the way."""
+    """All models, the elbow in both modes, under all integrators; looked at, copied, reset on the way."""
     ends = []
-    for path in MODELS:
-        model = load(path)
+    for model in (*map(load, MODELS), load(mode="transmission")):
         for integrator in range(4):
             model.opt.integrator = integrator
             data, other = moving(model), moving(model, 1)
@@ -125,8 +124,7 @@ def garbage() -> list[mujoco.MjData]:
     """Anything in plugin_state, in poses, controls and numbers of the model; resets cure it."""
     ends = []
     rng = np.random.default_rng(7)
-    for path in MODELS:
-        model = load(path)
+    for model in (*map(load, MODELS), load(mode="transmission")):
         data = moving(model)
         for k in range(30):
             bits = rng.integers(0, 2**64, model.npluginstate, dtype=np.uint64, endpoint=False)
