@@ -8,7 +8,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
-from declared_models import ARM, HILL, declared, element
+from declared_models import ARM, EXTENSOR, HILL, declared, element
 from mujoco import batch, rollout
 from native_twins import ELBOW, EXPLICIT, excite, native_model, start
 from test_plugin import SCENES, STATE, moving, spec_of, state_of
@@ -35,7 +35,15 @@ def rows() -> str:
     return arm.format(tendon="", actuator="", custom=made, option="")
 
 
-SCENE = {**SCENES, "rows": rows(), "scaled": SCENES["arm"].replace('force="400"', 'scale="100"')}
+EARLY = """<general name="extensor" tendon="extensor" gaintype="muscle" biastype="muscle" dyntype="filter" dynprm=".05"
+  actearly="true" lengthrange="0.3 0.6" gainprm="0.75 1.05 400 200 0.5 1.6 1.5 1.3 1.2"
+  biasprm="0.75 1.05 400 200 0.5 1.6 1.5 1.3 1.2"/>"""
+SCENE = {
+    **SCENES,
+    "rows": rows(),
+    "scaled": SCENES["arm"].replace('force="400"', 'scale="100"'),
+    "early": ARM.format(tendon=EXTENSOR, actuator=EARLY, custom="", option=""),
+}
 
 
 def set_to(name: str, index: object, value: float) -> Change:
@@ -74,6 +82,7 @@ CHANGES = {
     "capsule": ("rows", geom("ulna", 0, 1.5)),
     "size in a numeric": ("rows", scale("numeric_data", 0, 0.5)),
     "slack length": ("elastic arm", scale("numeric_data", slice(2, None, 3), 1.05)),
+    "time constant of an early activation": ("early", set_to("actuator_dynprm", (0, 0), 0.2)),
     "scale and acc0": ("scaled", scale("actuator_acc0", 0, 3.0)),
 }
 
