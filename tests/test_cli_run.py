@@ -248,6 +248,11 @@ def test_a_model_without_muscles_runs(tmp_path: Path, capsys: pytest.CaptureFixt
         ([ELBOW, "--record", "{folder}/r.bin"], r"must end in \.rrd"),
         ([ELBOW, "--out", "{folder}/t.xlsx"], r"must end in \.sto or \.mot or \.csv or \.npz"),
         ([ELBOW, "--columns", "length,weight"], "no kind 'weight'; kinds: qpos, qvel"),
+        (
+            [ELBOW, "--video", "{folder}/f.gif", "--mode", "python"],
+            "--video shows the muscles of the engine plugin",
+        ),
+        ([ELBOW, "--video", "{folder}/f.avi"], r"\.mp4|OpenGL"),
         ([ELBOW, "--mode", "sideways"], "mode 'sideways' does not exist; modes: wrench"),
         ([ELBOW, "--excitation", "{text}.sto"], r"text\.xml\.sto'.*no such file"),
         ([ELBOW, "--csv", "{folder}/c.csv", "--plot", "{folder}/missing/p.png"], "missing"),
@@ -403,6 +408,24 @@ def test_the_plugin_moves_the_model_to_the_same_places(
         assert np.array_equal(table.time, first.time)
         assert np.abs(table.values - first.values).max() < 1e-9
     assert np.array_equal(tables["wrench"]["qpos:elbow_flexion"], first["qpos:elbow_flexion"])
+
+
+def test_a_film_shows_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A frame for each thirtieth of a second; the motion is the same as without it."""
+    image = pytest.importorskip("PIL.Image", reason="GIFs need Pillow")
+    film, table, alone = tmp_path / "f.gif", tmp_path / "t.npz", tmp_path / "a.npz"
+    options = ["--duration", 0.2, "--excitation", "constant:0.5"]
+    ran = simulate(capsys, ELBOW, *options, "--video", film, "--out", table)
+    if "OpenGL" in ran.err:
+        pytest.skip(ran.err)
+    assert ran.code == 0, ran.err
+    assert "plugin mode wrench" in ran.out
+    assert f"video:     {film}" in ran.out
+    with image.open(film) as frames:
+        seconds = sum(frames.seek(k) or frames.info["duration"] for k in range(frames.n_frames)) / 1e3
+    assert seconds == pytest.approx(0.2, abs=0.05)
+    assert simulate(capsys, ELBOW, *options, "--mode", "wrench", "--out", alone).code == 0
+    assert np.array_equal(mw.read_table(table).values, mw.read_table(alone).values)
 
 
 def test_the_plugin_drives_muscles_without_an_actuator(

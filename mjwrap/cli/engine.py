@@ -70,9 +70,15 @@ class PluginEngine:
         self.seen = mujoco.MjData(self.muscles.model)
         self._strict = strict
         self._excitations = excitations(self.data)
-        # muscles without an actuator; their states are read from a copy, so that the run stays as it is
+        self._copy = mujoco.MjData(self.model)
+        # muscles without an actuator: their states are the plugin's
         self._own = [i for i, muscle in enumerate(self.muscles.declarations) if muscle.actuator < 0]
-        self._copy = mujoco.MjData(self.model) if self._own else None
+
+    def fresh(self) -> mujoco.MjData:
+        """Return a copy in which all is computed at the present state, so that the run stays as it is."""
+        mujoco.mj_copyData(self._copy, self.model, self.data)
+        mujoco.mj_forward(self.model, self._copy)
+        return self._copy
 
     def step(self) -> None:
         """Advance by one time step."""
@@ -95,10 +101,8 @@ class PluginEngine:
         seen.time = data.time
         for name in ("qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat"):
             getattr(seen, name)[:] = getattr(data, name)
-        if self._copy is not None:
-            mujoco.mj_copyData(self._copy, self.model, data)
-            mujoco.mj_forward(self.model, self._copy)
-            held, branch = self._read(self._copy), self.muscles.branch(seen)
+        if self._own:
+            held, branch = self._read(self.fresh()), self.muscles.branch(seen)
             own = branch[-2 * self.muscles.n :].reshape(-1, 2)
             for i in self._own:
                 k = held.names.index(self.muscles.names[i])

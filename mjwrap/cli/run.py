@@ -14,6 +14,7 @@ Examples:
   mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --record elbow.rrd --plot elbow.png
   mjwrap run models/elbow/elbow.xml --excitation controls.sto --out elbow.sto --columns length,tension,moment_arm
   mjwrap run myo_sim:myoarm_r --mode wrench --excitation random:3 'DELT*=constant:0.5' --csv arm.csv --json
+  mjwrap run models/five_surfaces/five_surfaces.xml --duration 4 --excitation sine:0.5,0.5,0.5 --video five.mp4
   mjwrap run models/paper_case2/paper_case2.xml --duration 3 --prescribe cylinder_y=sine:0.02,1 --csv case2.csv
 """
 
@@ -26,12 +27,13 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import mujoco
 
-from mjwrap import MuscleSystem, Recorder, Status, __version__
+from mjwrap import Recorder, Status, __version__
 from mjwrap.cli.arguments import at_least, positive
-from mjwrap.cli.engine import MODES, Engine, start_engine
+from mjwrap.cli.engine import MODES, Engine, PluginEngine, start_engine
 from mjwrap.cli.errors import INTERRUPTED, UserError
 from mjwrap.cli.history import History
 from mjwrap.cli.models import INTEGRATORS, set_state, start_keyframe
@@ -44,7 +46,8 @@ from mjwrap.excitation import Excitation
 from mjwrap.files import SUFFIXES
 
 Log = Callable[[mujoco.MjData], object]
-OUTPUTS = (("recording", "record"), ("plot", "plot"), ("csv", "csv"), ("table", "out"))
+Kept = TypeVar("Kept")
+OUTPUTS = (("recording", "record"), ("video", "video"), ("plot", "plot"), ("csv", "csv"), ("table", "out"))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--duration", type=positive, default=1.0, metavar="S", help="simulated time (default %(default)s s)")
     add("--timestep", type=positive, metavar="S", help="instead of the model's")
     add("--integrator", choices=INTEGRATORS, type=str.lower, help="instead of the model's")
-    add("--mode", default=MODES[0], metavar="MODE", help="what runs the muscles: python (default), step by step; or "
-        "the engine plugin, as mjwrap.install knows it: wrench, transmission")  # fmt: skip
+    add("--mode", metavar="MODE", help="what runs the muscles: python, in steps (default); or the engine plugin, as "
+        "mjwrap.install knows it: wrench (default with --video), transmission")  # fmt: skip
     several = {"nargs": "+", "action": "extend", "default": []}
     add("--excitation", **several, metavar="PATTERN|NAME=PATTERN|FILE", help="see above")
     add("--prescribe", **several, metavar="JOINT=PATTERN|FILE", help="joints that follow a constant, sine or cosine "
@@ -79,6 +82,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
     add(
+        "--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo at 30 frames a second (mp4, gif)"
+    )
+    add("--camera", metavar="NAME", help="a camera of the model, for the film (default: all of the model)")
+    add(
         "--plot",
         metavar="FILE.png",
         help="joints, activations, lengths and tensions over time (png, pdf, svg)",
@@ -92,6 +99,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Set up, run, and say what happened and where the files are."""
+    options.mode = options.mode or ("wrench" if options.video else MODES[0])
+    if options.video and options.mode == MODES[0]:
+        raise UserError(
+            "--video shows the muscles of the engine plugin: leave --mode out, or let it be wrench"
+        )
     engine = start_engine(options.model, options.mode, options.strict)
     for model in {id(m): m for m in (engine.model, engine.muscles.model)}.values():
         if options.timestep is not None:
@@ -138,7 +150,12 @@ def open_outputs(
         logs.append(samples.log)
         closes.append(samples.close)
     if options.record:
-        logs.append(stack.enter_context(_recorder(model, muscles, options.record)).log)
+        logs.append(stack.enter_context(opened(lambda: Recorder(model, muscles, options.record))).log)
+    if isinstance(engine, PluginEngine) and options.video:
+        from mjwrap import Video  # with MuJoCo's renderer
+
+        film = stack.enter_context(opened(lambda: Video(engine.model, options.video, camera=options.camera)))
+        logs.append(lambda _: film.log(engine.fresh()))
     if plot is not None:
         history = History(muscles)
         logs.append(history.log)
@@ -152,10 +169,10 @@ def open_outputs(
     return logs, closes
 
 
-def _recorder(model: mujoco.MjModel, muscles: MuscleSystem, path: str) -> Recorder:
-    """Return a recorder; what is wrong with its place is the user's to mend."""
+def opened(make: Callable[[], Kept]) -> Kept:
+    """Return a recording or film that has been begun; what is wrong with its place is the user's to mend."""
     try:
-        return Recorder(model, muscles, path)
+        return make()
     except RecordingError as error:
         raise UserError(str(error)) from None
 
