@@ -92,6 +92,14 @@ def _room(c, route):
 
 
 @jit
+def _copy(count, origin, first, target, place):
+    """Copy numbers from origin[first:] to target[place:], through views: else every index is checked for its sign."""
+    taken, given = origin[first:], target[place:]
+    for i in range(count):
+        given[i] = taken[i]
+
+
+@jit
 def _load_held(block, state):
     """Read the segments of the last good paths of the routes that have none now."""
     n, nodes, routes, _ = _sizes(block)
@@ -109,9 +117,7 @@ def _load_held(block, state):
             most = route[c, R_HI] - route[c, R_LO] + 1
             fits = 0.0 <= state[at] <= most  # anybody may write to plugin_state
             count[c] = int(state[at]) if fits else 0
-            first = sg.SEGMENT * (route[c, R_LO] + c)
-            for i in range(sg.SEGMENT * count[c]):
-                seg[first + i] = state[at + 1 + i]
+            _copy(sg.SEGMENT * count[c], state, at + 1, seg, sg.SEGMENT * (route[c, R_LO] + c))
         at += _room(c, route)
 
 
@@ -145,9 +151,7 @@ def _save(block, state):
                 state[at + lay.STATE + i] = node[k, lay.HINT + i]
             at += SAVED
         state[at] = count[c]
-        first = sg.SEGMENT * (route[c, R_LO] + c)
-        for i in range(sg.SEGMENT * count[c]):
-            state[at + 1 + i] = seg[first + i]
+        _copy(sg.SEGMENT * count[c], seg, sg.SEGMENT * (route[c, R_LO] + c), state, at + 1)
         at += _room(c, route)
 
 
