@@ -173,10 +173,10 @@ def twice() -> list[mujoco.MjData]:
 
 def version() -> list[mujoco.MjData]:
     """A MuJoCo whose structs are others is refused by an error, before anything is written."""
-    declared = dict(offsets._structs())
+    declared = dict(offsets.structs())
     fields = tuple(f for f in declared["mjData"].fields if f.name != "arena")
     declared["mjData"] = type("Declared", (), {"fields": fields})
-    offsets._structs = lambda: declared
+    offsets.structs = lambda: declared
     offsets.offsets.cache_clear()
     try:
         mw.load(MODELS[0])

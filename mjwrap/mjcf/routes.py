@@ -138,7 +138,9 @@ def _node(model: mujoco.MjModel, muscle: str, place: _Place) -> Node:
         surface = read_surface(model, place.geom, place.sizes, place.finite)
     except ModelError as error:
         raise ModelError(f"muscle '{muscle}': {error}") from None
-    return Node(geom=place.geom, hint_site=place.hint, surface=surface, inside=place.inside, sizes=place.sizes)
+    return Node(
+        geom=place.geom, hint_site=place.hint, surface=surface, inside=place.inside, sizes=place.sizes
+    )
 
 
 def _describe(model: mujoco.MjModel, place: _Place) -> str:

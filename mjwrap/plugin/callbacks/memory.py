@@ -98,12 +98,6 @@ def halves(address, shape):
 
 
 @jit
-def octets(address, shape):
-    """Return the bytes at an address as an array of the given shape."""
-    return carray(pointer(address), shape, np.uint8)
-
-
-@jit
 def flags(address, shape):
     """Return the bytes at an address as an array of booleans of the given shape."""
     return carray(pointer(address), shape, np.bool_)
