@@ -1,7 +1,9 @@
 """What recording costs: an elbow simulated with and without a Recorder, in turns, in one run.
 
 Prints medians over the turns: wall and processor time of a step (whatever else the machine does shows in the first, not
-in the second), of a call of `log` with its share of the writing, and of making and closing the Recorder.
+in the second), of a call of `log` with its share of the writing, and of what is done once: making the Recorder and
+logging the first state (open), writing the last batch and reading the table of contents back (close). A run should be
+several batches long: --steps.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import tempfile
 import time
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -25,12 +28,26 @@ ROOT = Path(__file__).resolve().parent.parent
 STEPS_BEFORE = 100
 
 
-def simulate(model: mujoco.MjModel, steps: int, path: Path | None) -> dict[str, float]:
-    """Simulate `steps` steps, each one logged where there is a path; times in seconds."""
+def read(source: str) -> mujoco.MjModel:
+    """Load an MJCF file, or a model that the myo_sim package composes."""
+    if not source.startswith("myo_sim:"):
+        return mujoco.MjModel.from_xml_path(source)
+    import myo_sim
+
+    model: Any = myo_sim.load_model(source.removeprefix("myo_sim:"))
+    return model
+
+
+def simulate(
+    model: mujoco.MjModel, steps: int, path: Path | None, rate: float | None = None
+) -> dict[str, float]:
+    """Simulate `steps` steps, with a call of `log` after each one where there is a path; times in seconds."""
     muscles, data = MuscleSystem(model), mujoco.MjData(model)
     muscles.step(data, nstep=STEPS_BEFORE)
     opened = time.perf_counter()
-    recorder = Recorder(model, muscles, path) if path else None
+    recorder = Recorder(model, muscles, path, rate=rate) if path else None
+    if recorder:
+        recorder.log(data)
     wall, thread, process = time.perf_counter(), time.thread_time(), time.process_time()
     phase = np.arange(model.nu)
     for _ in range(steps):
@@ -51,12 +68,12 @@ def simulate(model: mujoco.MjModel, steps: int, path: Path | None) -> dict[str, 
     return took
 
 
-def measure(model: mujoco.MjModel, steps: int, turns: int) -> dict[str, float]:
+def measure(model: mujoco.MjModel, steps: int, turns: int, rate: float | None) -> dict[str, float]:
     """Medians over the turns, per step in microseconds, per run in milliseconds."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.rrd"
-        simulate(model, steps, path)  # loads rerun, compiles what is still to be compiled
-        pairs = [(simulate(model, steps, None), simulate(model, steps, path)) for _ in range(turns)]
+        simulate(model, steps, path, rate)  # loads rerun, compiles what is still to be compiled
+        pairs = [(simulate(model, steps, None), simulate(model, steps, path, rate)) for _ in range(turns)]
         size = path.stat().st_size
 
     def step_us(kind: str, turn: int) -> float:
@@ -70,21 +87,31 @@ def measure(model: mujoco.MjModel, steps: int, turns: int) -> dict[str, float]:
     report |= {
         f"{name}_ms": 1e3 * float(np.median([pair[1][name] for pair in pairs])) for name in ("open", "close")
     }
+    report["muscles"] = float(MuscleSystem(model).n)
     return report | {"file_bytes": float(size), "steps": float(steps), "turns": float(turns)}
 
 
 def main() -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="bench_recording", description=__doc__, allow_abbrev=False)
-    parser.add_argument("--model", default=str(ROOT / "models/elbow/elbow.xml"), help="MJCF file")
-    parser.add_argument("--steps", type=int, default=10_000, help="steps of a run (default %(default)s)")
+    parser.add_argument(
+        "--model", default=str(ROOT / "models/elbow/elbow.xml"), help="MJCF file, or myo_sim:NAME"
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        help="states recorded a second of simulated time; one at every step if not given",
+    )
+    parser.add_argument("--steps", type=int, default=50_000, help="of a run (default %(default)s)")
     parser.add_argument("--turns", type=int, default=5, help="runs of each kind (default %(default)s)")
     parser.add_argument("--json", metavar="FILE", help="write the numbers there too")
     options = parser.parse_args()
-    model = mujoco.MjModel.from_xml_path(options.model)
-    report = measure(model, options.steps, options.turns)
+    model = read(options.model)
+    report = measure(model, options.steps, options.turns, options.rate)
+    states = f"{options.rate:g} Hz" if options.rate else "at every step"
     print(
-        f"{Path(options.model).name}, {model.nu} muscles, {options.steps} steps of {model.opt.timestep:g} s, 60 Hz"
+        f"{Path(options.model).name}, {int(report['muscles'])} muscles, {options.steps} steps of "
+        f"{model.opt.timestep:g} s; curves {states}, paths 60 Hz"
     )
     for kind, what in (
         ("wall", "wall clock"),

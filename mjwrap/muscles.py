@@ -11,6 +11,7 @@ from typing import ClassVar, Protocol
 
 from mjwrap.errors import ModelError
 from mjwrap.kernels import degroote_fregly, millard, muscle
+from mjwrap.kernels.mujoco_muscle import MINVAL
 
 TENDONS = ("rigid", "elastic")
 # Below this [l_o] an elastic tendon is rigid: at maximum isometric force it would stretch by 5e-6 l_o, which changes
@@ -28,6 +29,11 @@ class Law(Protocol):
     @property
     def states(self) -> int:
         """Return how many states the law has of activation and fibre length, in this order: 0, 1 or 2."""
+        ...
+
+    @property
+    def strength(self) -> float:
+        """Return the tension [N] that it has fully active, at rest and at its best length, without the passive part."""
         ...
 
     def row(self) -> tuple[float, ...]:
@@ -117,6 +123,11 @@ class DeGrooteFregly2016:
         """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
         return 2 if _is_elastic(self) else 1
 
+    @property
+    def strength(self) -> float:
+        """Return the maximum isometric force along the tendon [N]."""
+        return self.max_isometric_force * math.cos(self.pennation_angle)
+
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of `mjwrap/kernels/fiber.py`."""
         return _fiber_row(self, degroote_fregly.LEAST)
@@ -152,6 +163,11 @@ class Millard2012:
     def states(self) -> int:
         """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
         return 2 if _is_elastic(self) else 1
+
+    @property
+    def strength(self) -> float:
+        """Return the maximum isometric force along the tendon [N]."""
+        return self.max_isometric_force * math.cos(self.pennation_angle)
 
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of `mjwrap/kernels/fiber.py`."""
@@ -201,6 +217,12 @@ class MuJoCoMuscle:
         """Return 1: activation."""
         return 1
 
+    @property
+    def strength(self) -> float:
+        """Return the peak active force [N], along the path: MuJoCo's `force`, or `scale / acc0`, times gear."""
+        force, scale = self.prm[2:4]
+        return self.gear * (force if force >= 0.0 else scale / max(MINVAL, self.acc0))
+
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of `mjwrap/kernels/mujoco_muscle.py`."""
         range0, range1, force, scale, _, lmax, _, fpmax, _ = self.passive or self.prm
@@ -243,6 +265,11 @@ class PathActuator:
     def states(self) -> int:
         """Return 0: its activation is the excitation."""
         return 0
+
+    @property
+    def strength(self) -> float:
+        """Return the optimal force [N]."""
+        return self.optimal_force
 
     def row(self) -> tuple[float, ...]:
         """Return the parameter of `path_actuator` in `mjwrap/kernels/muscle.py`."""

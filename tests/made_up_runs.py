@@ -12,7 +12,7 @@ from rerun.chunk import RrdReader
 import mjwrap as mw
 
 ROOT = Path(__file__).resolve().parent.parent
-QUANTITIES = ("length", "velocity", "tension", "activation")
+MEASURED = ("length", "velocity", "tension", "activation", "fiber_length", "status", "iterations")
 XML = """
 <mujoco model="bench">
   <asset>
@@ -45,10 +45,6 @@ XML = """
 """
 
 
-def joined(points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    return np.concatenate(points), np.cumsum([0] + [len(each) for each in points])
-
-
 class Muscles:
     """MuscleSystem's face over made-up numbers: everything differs in every row, so that mixing any two shows."""
 
@@ -64,6 +60,7 @@ class Muscles:
                 via_sites=[sites["via"]] if i == 0 else [],
                 geoms=[drum] if i == 0 else [],
                 surfaces=[mw.Cylinder(0.05)] if i == 0 else [],
+                parameters=mw.Millard2012(100.0 * (i + 1), 0.1, 0.2),
             )
             for i, name in enumerate(names)
         ]
@@ -73,17 +70,20 @@ class Muscles:
     def forward(self, data: mujoco.MjData) -> None:
         self.time, self.row = data.time, self.row + 1
         rng = np.random.default_rng(self.row)
-        self.length, self.velocity, self.tension = rng.normal(size=(3, self.n))
+        self.length, self.velocity, self.tension, self.fiber_length = rng.normal(size=(4, self.n))
         self.activation = rng.uniform(size=self.n)
+        self.status = rng.integers(0, 3, self.n)
+        self.iterations = rng.integers(0, 100, self.n)
 
     def poses(self, data: mujoco.MjData) -> mujoco.MjData:
         return data
 
-    def polylines(self, spacing: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        return joined([self.points(i) for i in range(self.n)])
+    def history(self, rows: int) -> "History":
+        return History(self)
 
-    def contacts(self) -> tuple[np.ndarray, np.ndarray]:
-        return joined([self.contact_points(i).reshape(-1, 3) for i in range(self.n)])
+    def moment_arms(self, row: int, muscles: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+        """Of pairs of a muscle and a coordinate, (K,)."""
+        return np.cos(row + muscles + 7.0 * dofs)
 
     def points(self, i: int) -> np.ndarray:
         count = 2 + (self.row + i) % 3
@@ -94,9 +94,56 @@ class Muscles:
     def contact_points(self, i: int) -> np.ndarray:
         return np.random.default_rng([self.row, i, 1]).normal(size=((self.row + i) % 2, 2, 3))
 
+    def arrows(self, i: int) -> np.ndarray:
+        """Tails [m] and forces [N], (k, 2, 3)."""
+        return np.random.default_rng([self.row, i, 2]).normal(size=(2 + (self.row + i) % 2, 2, 3))
+
+
+class History:
+    """The same for `MuscleSystem.history`."""
+
+    def __init__(self, muscles: Muscles) -> None:
+        self._muscles = muscles
+        self._states: list[dict[str, np.ndarray]] = []
+        self._frames: list[list[list[np.ndarray]]] = []  # frame, kind, muscle
+        self._rows: list[int] = []
+
+    def put_state(self, row: int) -> None:
+        del self._states[row:]
+        self._states.append({name: getattr(self._muscles, name).copy() for name in MEASURED})
+
+    def put_frame(self, frame: int, poses: mujoco.MjData, spacing: float | None) -> None:
+        del self._frames[frame:], self._rows[frame:]
+        muscles = self._muscles
+        kinds = (muscles.points, lambda i: muscles.contact_points(i).reshape(-1, 3), muscles.arrows)
+        self._frames.append([[kind(i) for i in range(muscles.n)] for kind in kinds])
+        self._rows.append(muscles.row)
+
+    def states(self, rows: int) -> dict[str, np.ndarray]:
+        return {name: np.array([state[name] for state in self._states[:rows]]) for name in MEASURED}
+
+    def _ragged(self, kind: int, frames: int) -> tuple[np.ndarray, np.ndarray]:
+        parts = [[frame[kind][i] for frame in self._frames[:frames]] for i in range(self._muscles.n)]
+        counts = np.array([[len(each) for each in muscle] for muscle in parts])
+        return np.concatenate([each for muscle in parts for each in muscle]), counts
+
+    def polylines(self, frames: int) -> tuple[np.ndarray, np.ndarray]:
+        return self._ragged(0, frames)
+
+    def contacts(self, frames: int) -> tuple[np.ndarray, np.ndarray]:
+        return self._ragged(1, frames)
+
+    def arrows(self, frames: int, scale: float) -> tuple[np.ndarray, np.ndarray]:
+        arrows, counts = self._ragged(2, frames)
+        return arrows * np.array([1.0, scale])[:, np.newaxis], counts
+
+    def moment_arms(self, frames: int, muscles: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+        rows = [self._muscles.moment_arms(row, muscles, dofs) for row in self._rows[:frames]]
+        return np.array(rows).reshape(frames, len(muscles))
+
 
 def simulate(
-    model: mujoco.MjModel, path: Path, steps: int = 100, **options: Any
+    model: mujoco.MjModel, path: Path | None, steps: int = 100, **options: Any
 ) -> tuple[list[SimpleNamespace], Muscles]:
     """Record `steps` states and return what each of them was."""
     muscles = Muscles(model)
@@ -111,13 +158,15 @@ def simulate(
                     xquat=data.xquat.copy(),
                     points=[muscles.points(i) for i in range(muscles.n)],
                     contacts=[muscles.contact_points(i) for i in range(muscles.n)],
-                    **{name: getattr(muscles, name).copy() for name in QUANTITIES},
+                    arrows=[muscles.arrows(i) for i in range(muscles.n)],
+                    arms=muscles.moment_arms(muscles.row, np.arange(muscles.n), np.zeros(muscles.n)),
+                    **{name: getattr(muscles, name).copy() for name in MEASURED},
                 )
             )
     return log, muscles
 
 
-def recorder(model: mujoco.MjModel, muscles: Any, path: Path, **options: Any) -> mw.Recorder:
+def recorder(model: mujoco.MjModel, muscles: Any, path: Path | None, **options: Any) -> mw.Recorder:
     """A Recorder that takes `Muscles` for a MuscleSystem."""
     return mw.Recorder(model, muscles, path, **options)
 

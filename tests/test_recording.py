@@ -1,4 +1,4 @@
-"""A recording holds what was logged, exactly, and shows all of it."""
+"""A recording holds what was logged, exactly."""
 
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,7 @@ import mjwrap as mw
 
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 
-from made_up_runs import QUANTITIES, ROOT, XML, Muscles, moving, read, recorder, simulate, states, static
-from rerun.chunk import RrdReader
+from made_up_runs import MEASURED, ROOT, XML, Muscles, moving, read, recorder, simulate, static
 
 from mjwrap.recording import read_summary
 from mjwrap.recording.columns import activation_colors
@@ -29,17 +28,64 @@ def test_scalars_are_those_logged_to_the_last_bit(
 ) -> None:
     log, _ = simulate(model, tmp_path / "run.rrd", flush_every=flush_every)
     content = read(tmp_path / "run.rrd")
-    for quantity in QUANTITIES:
-        for i, name in enumerate(["BIC", r"my\ muscle\/2"]):
-            expected = [(round(s.time * 1e9), [getattr(s, quantity)[i]]) for s in log]
-            assert moving(content[f"/{quantity}/{name}"]["Scalars:scalars"]) == expected
+    times = [round(s.time * 1e9) for s in log]
+    for i, name in enumerate(["BIC", r"my\ muscle\/2"]):
+        for quantity in MEASURED:
+            expected = [[float(getattr(s, quantity)[i])] for s in log]
+            rows = moving(content[f"/{quantity}/{name}"]["Scalars:scalars"])
+            assert rows == list(zip(times, expected, strict=True))
+        power = [[-s.tension[i] * s.velocity[i]] for s in log]
+        assert [value for _, value in moving(content[f"/power/{name}"]["Scalars:scalars"])] == power
+
+
+@pytest.mark.parametrize("flush_every", [7, 1000])
+def test_curves_at_a_rate_are_those_of_the_first_state_of_each_period(
+    model: mujoco.MjModel, tmp_path: Path, flush_every: int
+) -> None:
+    log, _ = simulate(model, tmp_path / "run.rrd", flush_every=flush_every, rate=100.0, path_rate=25.0)
+    content = read(tmp_path / "run.rrd")
+    due = log[::5]  # 2 ms apart
+    expected = [(round(s.time * 1e9), [s.tension[0]]) for s in due]
+    assert moving(content["/tension/BIC"]["Scalars:scalars"]) == expected
+    strips = moving(content["/world/muscles/BIC/path"]["LineStrips3D:strips"])
+    assert [t for t, _ in strips] == [round(s.time * 1e9) for s in log[::20]]
+
+
+def test_group_curves_are_sums_over_the_group(model: mujoco.MjModel, tmp_path: Path) -> None:
+    log, _ = simulate(model, tmp_path / "run.rrd", groups={"both": "*"}, flush_every=7)
+    content = read(tmp_path / "run.rrd")
+
+    def rows(quantity: str) -> list[float]:
+        return [value for _, (value,) in moving(content[f"/groups/{quantity}/both"]["Scalars:scalars"])]
+
+    # sums of two numbers, so to the bit but for the mean's division
+    assert rows("tension") == [s.tension[0] + s.tension[1] for s in log]
+    assert rows("without_path") == [float(np.count_nonzero(s.status)) for s in log]
+    np.testing.assert_allclose(rows("activation"), [s.activation.mean() for s in log], rtol=1e-15)
+    np.testing.assert_allclose(rows("power"), [-s.tension @ s.velocity for s in log], rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("flush_every", [7, 1000])
+def test_every_change_of_a_status_is_said_once(
+    model: mujoco.MjModel, tmp_path: Path, flush_every: int
+) -> None:
+    log, _ = simulate(model, tmp_path / "run.rrd", steps=30, flush_every=flush_every)
+    lines = moving(read(tmp_path / "run.rrd")["/solver"]["TextLog:text"])
+    before, expected = np.zeros(2), []
+    for s in log:
+        expected += [
+            (round(s.time * 1e9), [f"{('BIC', 'my muscle/2')[i]}: {mw.Status(s.status[i]).message}"])
+            for i in np.flatnonzero(s.status != before)
+        ]
+        before = s.status
+    assert lines == expected
 
 
 @pytest.mark.parametrize("flush_every", [7, 1000])
 def test_paths_are_those_of_the_displayed_frames(
     model: mujoco.MjModel, tmp_path: Path, flush_every: int
 ) -> None:
-    log, _ = simulate(model, tmp_path / "run.rrd", flush_every=flush_every, path_rate=60.0)
+    log, _ = simulate(model, tmp_path / "run.rrd", flush_every=flush_every, path_rate=60.0, force_scale=0.25)
     content = read(tmp_path / "run.rrd")
     # the first state at or after each sixtieth of a second: 0, 16.7, 33.3 … ms
     frames = [log[step] for step in [0, 9, 17, 25, 34, 42, 50, 59, 67, 75, 84, 92]]
@@ -58,6 +104,16 @@ def test_paths_are_those_of_the_displayed_frames(
         assert [value for _, value in touches] == [
             s.contacts[i].reshape(-1, 3).astype(np.float32).tolist() for s in frames
         ]
+        arrows = content[f"/world/forces/{name}"]
+        for component, part, size in (("Arrows3D:origins", 0, 1.0), ("Arrows3D:vectors", 1, 0.25)):
+            rows = moving(arrows[component])
+            assert [t for t, _ in rows] == times
+            assert [value for _, value in rows] == [
+                (size * s.arrows[i][:, part]).astype(np.float32).tolist() for s in frames
+            ]
+    arms = moving(content["/moment_arm/hinge"]["Scalars:scalars"])
+    assert arms == [(t, s.arms.tolist()) for t, s in zip(times, frames, strict=True)]
+    assert static(content, "/moment_arm/hinge", "SeriesLines:names") == ["BIC", "my muscle/2"]
     assert moving(content[r"/world/muscles/my\ muscle\/2/path"]["LineStrips3D:strips"])[0] == (0, [])
 
 
@@ -147,31 +203,6 @@ def test_activation_goes_from_blue_to_red() -> None:
     assert blue[0] > 200 > 100 > red[0]
     assert red[-1] > 200 > 100 > blue[-1]
     assert np.all(alpha == 0xFF)
-
-
-@pytest.mark.parametrize("count", [2, 20])
-def test_the_layout_shows_the_model_and_every_muscle(
-    model: mujoco.MjModel, tmp_path: Path, count: int
-) -> None:
-    names = tuple(f"m{i}" for i in range(count))
-    muscles = Muscles(model, names)
-    with recorder(model, muscles, tmp_path / "run.rrd") as record:
-        for data in states(model, muscles, 3):
-            record.log(data)
-    reader = RrdReader(tmp_path / "run.rrd")
-    (layout,) = reader.blueprints()
-    shown: list[str] = []
-    kinds: list[str] = []
-    for chunk in reader.stream(store=layout):
-        columns = chunk.to_record_batch()
-        for name, found in [("ViewContents:query", shown), ("ViewBlueprint:class_identifier", kinds)]:
-            if name in columns.schema.names:
-                found += [word for row in columns.column(name).to_pylist() for word in row]
-    for quantity in QUANTITIES:
-        curves = [line for line in shown if line.startswith(f"+ /{quantity}/")]
-        assert sorted(curves) == sorted(f"+ /{quantity}/{name}" for name in names)  # each once, none lost
-    assert kinds.count("3D") == 1
-    assert kinds.count("TimeSeries") == 4 * -(-count // 8)  # pages of eight
 
 
 def test_the_summary_tells_what_is_there(model: mujoco.MjModel, tmp_path: Path) -> None:

@@ -46,26 +46,42 @@ def instances(model: mujoco.MjModel) -> list[int]:
     return found
 
 
+def block_address(data: mujoco.MjData, instance: int) -> int:
+    """Return the address of an instance's block."""
+    return int(np.asarray(data.plugin_data)[instance])
+
+
+def head_of(block: int) -> NDArray[np.int64]:
+    """Return the head of the block at an address (`callbacks/block.py`)."""
+    return np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
+
+
 def read(data: mujoco.MjData) -> Readout:
     """Return what the plugin computed last for `data`: in `mj_forward`, or in `mj_step` at the state it began with."""
     names: list[str] = []
     columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
     for instance in instances(data.model):
         names += reg.claim_of(data.model._address, instance).muscles
-        block = int(np.asarray(data.plugin_data)[instance])
-        head = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
+        block = block_address(data, instance)
+        head = head_of(block)
         for name in _COLUMNS:
             kind = ctypes.c_int64 if name in ("status", "failures") else ctypes.c_double
             start = block + int(head[bk.A_ROUTES + bk.ARRAYS.index(name)])
             columns[name].append(
                 np.ctypeslib.as_array((kind * int(head[bk.MUSCLES])).from_address(start)).copy()
             )
-        output = _outputs(block + int(head[bk.A_TRANSMISSION]), int(head[bk.MUSCLES]))
-        own, transmitted = columns["tension"][-1], output >= 0
-        rows = output[transmitted]
-        own[transmitted] = 0.0 - data.model.actuator_gear[rows, 0] * data.actuator_force[rows]
-        columns["transmitted"].append(transmitted)
+        columns["transmitted"].append(transmit(data, block, columns["tension"][-1]))
     return Readout(names, *(np.concatenate(parts) for parts in columns.values()))
+
+
+def transmit(data: mujoco.MjData, block: int, tension: Array) -> NDArray[np.bool_]:
+    """Set the tensions (n,) of a block's muscles that MuJoCo's own actuators pull; return which ones (n,) they are."""
+    head = head_of(block)
+    output = _outputs(block + int(head[bk.A_TRANSMISSION]), int(head[bk.MUSCLES]))
+    transmitted = output >= 0
+    rows = output[transmitted]
+    tension[transmitted] = 0.0 - data.model.actuator_gear[rows, 0] * data.actuator_force[rows]
+    return transmitted
 
 
 def _outputs(part: int, n: int) -> NDArray[np.int64]:

@@ -115,6 +115,24 @@ def read_plan(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Plan,
     return build_plan(model, muscles), muscles
 
 
+def _read_copy(address: int, claim: Claim) -> tuple[mujoco.MjModel, Plan, list[MuscleDeclaration]]:
+    """Return a copy of the model at an address, the muscles of a claim and their arrays; `_COPY` is held."""
+    _here.reading = True
+    try:
+        model = copy_of(address)
+        return model, *read_plan(model, claim.muscles, claim.mode)
+    finally:
+        _here.reading = False
+
+
+def read_instances(address: int, instances: list[int]) -> tuple[Plan, list[MuscleDeclaration]]:
+    """Return the muscles of instances of the model at an address, in their order, and the arrays of all of them."""
+    with _COPY:
+        read = [_read_copy(address, claim_of(address, instance)) for instance in instances]
+        muscles = [muscle for _, _, found in read for muscle in found]
+        return build_plan(read[-1][0], muscles), muscles
+
+
 def _image(address: int, instance: int) -> bytes:
     """Return the block for an instance of the model at an address; those of the last models are kept."""
     key = fingerprint(address), instance
@@ -122,14 +140,9 @@ def _image(address: int, instance: int) -> bytes:
         if key in _IMAGES:
             _IMAGES.move_to_end(key)
             return _IMAGES[key]
+    claim = claim_of(address, instance)
     with _COPY:
-        _here.reading = True
-        try:
-            model = copy_of(address)
-            claim = claim_of(address, instance)
-            plan, muscles = read_plan(model, claim.muscles, claim.mode)
-        finally:
-            _here.reading = False
+        model, plan, muscles = _read_copy(address, claim)
         if state_size(plan) != claim.numbers:
             raise ModelError(
                 f"the paths of the engine plugin's muscles have changed since mjwrap.install: their state needs "

@@ -10,10 +10,10 @@ import rerun as rr
 from rerun.components import LineStrip3DBatch, Position3DBatch
 
 TIMELINE = "sim_time"
-QUANTITIES = ("length", "velocity", "tension", "activation")
 
 _TIME = pa.duration("ns")
 _VEC3 = Position3DBatch._ARROW_DATATYPE
+_VECTOR = rr.components.Vector3DBatch._ARROW_DATATYPE
 _STRIP = LineStrip3DBatch._ARROW_DATATYPE
 _QUAT = rr.components.RotationQuatBatch._ARROW_DATATYPE
 
@@ -21,6 +21,9 @@ _BLUE = np.array([40.0, 80.0, 230.0])
 _RED = np.array([230.0, 30.0, 30.0])
 
 Array = npt.NDArray[Any]
+Ragged = tuple[
+    Array, Array
+]  # rows of all muscles, one muscle after the other, and how many each has a frame (n, T)
 
 
 def activation_colors(activation: npt.ArrayLike) -> npt.NDArray[np.uint32]:
@@ -59,14 +62,39 @@ def _field(entity: str, component: rr.ComponentDescriptor, datatype: pa.DataType
 
 
 def scalar_table(entities: Sequence[str]) -> Table:
-    """One float64 a row for each entity."""
+    """One or more float64 a row for each entity."""
     return Table((entity, rr.Scalars.descriptor_scalars(), pa.float64()) for entity in entities)
 
 
 def scalar_columns(values: Array) -> list[pa.Array]:
     """Values (T, m) as m columns of T rows."""
-    offsets = _one_each(len(values))
-    return [pa.ListArray.from_arrays(offsets, pa.array(column)) for column in np.ascontiguousarray(values.T)]
+    rows, columns = values.shape
+    # one array holds all columns, one after the other; a column is a slice of it, which costs next to nothing
+    whole = pa.ListArray.from_arrays(
+        _one_each(rows * columns), pa.array(np.ascontiguousarray(values.T).ravel())
+    )
+    return [whole.slice(i * rows, rows) for i in range(columns)]
+
+
+def vector_columns(values: Array, widths: Sequence[int]) -> list[pa.Array]:
+    """Values (T, sum of widths) as a column of T rows for each width, with so many values a row."""
+    ends = np.cumsum(widths)[:-1]
+    return [
+        pa.ListArray.from_arrays(_one_each(len(part), part.shape[1]), pa.array(part.ravel()))
+        for part in np.split(values, ends, axis=1)
+    ]
+
+
+def text_table(entity: str) -> Table:
+    """A line of text and its level a row."""
+    text, level = rr.TextLog.descriptor_text(), rr.TextLog.descriptor_level()
+    return Table([(entity, text, pa.string()), (entity, level, pa.string())])
+
+
+def text_columns(lines: Sequence[str], levels: Sequence[str]) -> list[pa.Array]:
+    """Lines of text and their levels as two columns."""
+    offsets = _one_each(len(lines))
+    return [pa.ListArray.from_arrays(offsets, pa.array(each, pa.string())) for each in (lines, levels)]
 
 
 def pose_table(entities: Sequence[str]) -> Table:
@@ -80,76 +108,51 @@ def pose_table(entities: Sequence[str]) -> Table:
 
 def pose_columns(positions: Array, quaternions: Array) -> list[pa.Array]:
     """Positions (T, m, 3) [m] and quaternions (T, m, 4) w-x-y-z as 2 m columns of T rows."""
-    offsets = _one_each(len(positions))
-    columns = []
-    for position, quaternion in zip(positions.swapaxes(0, 1), quaternions.swapaxes(0, 1), strict=True):
-        columns.append(pa.ListArray.from_arrays(offsets, _fixed(position, _VEC3)))
-        columns.append(pa.ListArray.from_arrays(offsets, _fixed(quaternion[:, [1, 2, 3, 0]], _QUAT)))
-    return columns
+    rows, bodies = positions.shape[:2]
+    offsets = _one_each(rows * bodies)
+    turned = quaternions[..., [1, 2, 3, 0]].swapaxes(0, 1)
+    whole = (
+        pa.ListArray.from_arrays(offsets, _fixed(positions.swapaxes(0, 1), _VEC3)),
+        pa.ListArray.from_arrays(offsets, _fixed(turned, _QUAT)),
+    )
+    return [array.slice(i * rows, rows) for i in range(bodies) for array in whole]
 
 
-def path_table(paths: Sequence[str], contacts: Sequence[str]) -> Table:
-    """A line strip, its colour and a set of points a row for each muscle."""
+def path_table(paths: Sequence[str], contacts: Sequence[str], forces: Sequence[str]) -> Table:
+    """A line strip, its colour, a set of points and a set of arrows a row for each muscle."""
     rows = []
-    for path, contact in zip(paths, contacts, strict=True):
+    for path, contact, force in zip(paths, contacts, forces, strict=True):
         rows.append((path, rr.LineStrips3D.descriptor_strips(), _STRIP))
         rows.append((path, rr.LineStrips3D.descriptor_colors(), pa.uint32()))
         rows.append((contact, rr.Points3D.descriptor_positions(), _VEC3))
+        rows.append((force, rr.Arrows3D.descriptor_origins(), _VEC3))
+        rows.append((force, rr.Arrows3D.descriptor_vectors(), _VECTOR))
     return Table(rows)
 
 
-def path_columns(paths: "Ragged", contacts: "Ragged", colors: npt.NDArray[np.uint32]) -> list[pa.Array]:
-    """Polylines and contact points of n muscles over T frames, and colours (T, n), as 3 n columns of T rows.
+def path_columns(
+    paths: "Ragged", contacts: "Ragged", arrows: "Ragged", colors: npt.NDArray[np.uint32]
+) -> list[pa.Array]:
+    """Polylines, contact points and arrows of n muscles over T frames, colours (T, n), as 5 n columns of T rows.
 
     A muscle that has no path in a frame, because none was found yet, has an empty row there.
     """
     frames, n = colors.shape
-    points, counts = paths.by_muscle(frames)
-    drawn = counts > 0
-    strips = pa.ListArray.from_arrays(_offsets(counts[drawn]), _fixed(points, _VEC3), type=_STRIP)
-    touches, numbers = contacts.by_muscle(frames)
-    # each array holds all muscles, one after the other; a column is a slice of it, which costs nothing
+    (points, counts), (touches, numbers), (forces, shafts) = paths, contacts, arrows
+    drawn = counts.ravel() > 0
+    strips = pa.ListArray.from_arrays(_offsets(counts.ravel()[drawn]), _fixed(points, _VEC3), type=_STRIP)
     whole = (
         pa.ListArray.from_arrays(_offsets(drawn), strips),
         pa.ListArray.from_arrays(_one_each(n * frames), pa.array(np.ascontiguousarray(colors.T).ravel())),
-        pa.ListArray.from_arrays(_offsets(numbers), _fixed(touches, _VEC3)),
+        pa.ListArray.from_arrays(_offsets(numbers.ravel()), _fixed(touches, _VEC3)),
+        pa.ListArray.from_arrays(_offsets(shafts.ravel()), _fixed(forces[:, 0], _VEC3)),
+        pa.ListArray.from_arrays(_offsets(shafts.ravel()), _fixed(forces[:, 1], _VECTOR)),
     )
     return [array.slice(i * frames, frames) for i in range(n) for array in whole]
 
 
-class Ragged:
-    """For every frame, points of every muscle, each with its own number of them."""
-
-    def __init__(self) -> None:
-        self._points: list[Array] = []  # (m, 3) a frame, muscle after muscle
-        self._starts: list[Array] = []  # (n + 1,) a frame
-
-    def put(self, frame: int, points: Array, starts: Array) -> None:
-        """Set the last frame: muscle i has `points[starts[i]:starts[i + 1]]`. What an interrupt left goes."""
-        del self._points[frame:], self._starts[frame:]
-        self._points.append(points)
-        self._starts.append(starts)
-
-    def first(self) -> Array:
-        """The points (m, 3) of the first frame, none where there is no frame."""
-        return self._points[0] if self._points else np.empty((0, 3))
-
-    def by_muscle(self, frames: int) -> tuple[Array, Array]:
-        """All points (m, 3), those of a muscle in a row, frame after frame, and how many each has (n frames,)."""
-        starts = np.stack(self._starts[:frames])  # (T, n + 1)
-        counts = np.diff(starts, axis=1).T.ravel()
-        before = np.concatenate([[0], np.cumsum(starts[:-1, -1])])  # points of earlier frames
-        blocks = (
-            starts[:, :-1] + before[:, np.newaxis]
-        ).T.ravel()  # where each muscle's points of a frame begin
-        ends = np.cumsum(counts)
-        order = np.arange(counts.sum()) + np.repeat(blocks - ends + counts, counts)
-        points = np.concatenate(self._points[:frames], dtype=np.float32)
-        return points.take(order.astype(np.intp), axis=0), counts
-
-
-def _one_each(rows: int) -> pa.Array:
-    return pa.array(np.arange(rows + 1, dtype=np.int32))
+def _one_each(rows: int, width: int = 1) -> pa.Array:
+    return pa.array(np.arange(0, width * rows + 1, width, dtype=np.int32))
 
 
 def _offsets(counts: Array) -> pa.Array:

@@ -1,48 +1,79 @@
-"""Rows of a recording between two flushes: one of scalars a call, one of poses and paths a displayed frame."""
+"""Rows of a recording between two flushes: one of scalars a state, one of poses, paths and forces a displayed frame."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from mjwrap.errors import RecordingError
+from mjwrap.paths import Status
 from mjwrap.recording import columns
-from mjwrap.recording.layout import blueprint
+from mjwrap.recording.layout import First, blueprint
 from mjwrap.recording.scene import Scene
 from mjwrap.recording.stream import Stream
 
 if TYPE_CHECKING:
-    from mjwrap.system import MuscleSystem
+    from mjwrap.system.results import Results
 
-EARLY = 1e-6  # part of a frame's period by which it may come too early, for times that are not exact
+EARLY = 1e-6  # part of a period by which a row may come too early, for times that are not exact
+LOG = "solver"  # entity of the lines that say which muscle has no path, and why
+ARROW = 0.3  # length of the strongest muscle's arrow, as part of the size of all paths
+
+
+class Options(NamedTuple):
+    """What a Recorder was asked for; see there."""
+
+    rate: float | None
+    path_rate: float
+    spacing: float | None
+    force_scale: float | None
+
+
+class Beat:
+    """Due at the first time at or after every whole multiple of a period from its first time on."""
+
+    def __init__(self, rate: float | None) -> None:
+        self._rate = rate
+        self._start: float | None = None
+        self._next = -np.inf
+
+    def due(self, time: float) -> bool:
+        """Whether a row is due at a time [s]; always where there is no rate."""
+        return time >= self._next
+
+    def take(self, time: float) -> None:
+        """Note the row at a time; the next one is due a period later."""
+        if self._rate is None:
+            return
+        if self._start is None:
+            self._start = time
+        # whole multiples, so that rounding does not add up
+        count = np.floor((time - self._start) * self._rate + EARLY) + 1
+        self._next = float(self._start + (count - EARLY) / self._rate)
 
 
 class Buffers:
-    """Room for `rows` calls of `add`; `take` turns what is there into record batches and empties it."""
+    """Room for `rows` states; `take` turns what is there into record batches and empties it."""
 
-    def __init__(
-        self, scene: Scene, muscles: "MuscleSystem", rate: float, rows: int, spacing: float | None
-    ) -> None:
-        self._scene, self._muscles = scene, muscles
-        self._rate = rate
-        self._spacing = spacing
-        self._poses = getattr(muscles, "poses", lambda data: data)
+    def __init__(self, scene: Scene, muscles: "Results", rows: int, options: Options) -> None:
+        self._scene, self._muscles, self._options = scene, muscles, options
+        self._states, self._displays = Beat(options.rate), Beat(options.path_rate)
         n, bodies = len(scene.muscle_names), scene.model.nbody
         self._time = np.empty(rows)
-        self._scalars = np.empty((len(columns.QUANTITIES), rows, n))
-        self._length, self._velocity, self._tension, self._activation = self._scalars
         self._frame_rows = np.empty(rows, dtype=np.int64)  # the row that each frame belongs to
         self._positions = np.empty((rows, bodies, 3), dtype=np.float32)
         self._quaternions = np.empty((rows, bodies, 4), dtype=np.float32)
-        self._paths, self._contacts = columns.Ragged(), columns.Ragged()
-        self._scalar_table = columns.scalar_table(
-            [path for q in columns.QUANTITIES for path in scene.series[q]]
+        self._history = muscles.history(rows)
+        self._widths = [len(coordinate.muscles) for coordinate in scene.coordinates]
+        self._crossing = (
+            np.array([i for coordinate in scene.coordinates for i in coordinate.muscles], dtype=np.int64),
+            np.repeat([coordinate.dof for coordinate in scene.coordinates], self._widths).astype(np.int64),
         )
-        self._pose_table = columns.pose_table([scene.bodies[body] for body in scene.moving])
-        self._path_table = columns.path_table(scene.paths, scene.contacts)
+        self._force_scale = options.force_scale
+        self._tables = _tables(scene)
+        self._before = np.zeros(n)  # status of the last row that was taken
         self._rows = self._frames = 0
-        self._start: float | None = None  # time of the first call
-        self._last_time = self._next_frame = -np.inf
+        self._last_time = -np.inf
 
     @property
     def full(self) -> bool:
@@ -50,60 +81,117 @@ class Buffers:
         return self._rows == len(self._time)
 
     def add(self, data: Any) -> None:
-        """Copy what belongs to the muscles' last forward."""
-        muscles, row = self._muscles, self._rows
-        time = muscles.time
+        """Copy what belongs to the muscles' last evaluation, where a row is due."""
+        time = self._muscles.time
         if not time >= self._last_time:
             raise RecordingError(
                 f"cannot log at time {time} s after {self._last_time} s: one recording is one run, in which time "
                 "goes forward; close this Recorder and make another one after a reset"
             )
-        self._time[row] = time
-        self._length[row] = muscles.length
-        self._velocity[row] = muscles.velocity
-        self._tension[row] = muscles.tension
-        self._activation[row] = muscles.activation
-        if time >= self._next_frame:
-            self._add_frame(data, row, time)
         self._last_time = time
+        display = self._displays.due(time)
+        if not (display or self._states.due(time)):
+            return
+        row = self._rows
+        self._time[row] = time
+        self._history.put_state(row)
+        self._states.take(time)
+        if display:
+            self._add_frame(data, row)
+            self._displays.take(time)
         self._rows = row + 1
 
-    def _add_frame(self, data: Any, row: int, time: float) -> None:
-        if self._start is None:
-            self._start = time
-        # frames are due at whole multiples of the period, so that rounding does not add up
-        due = np.floor((time - self._start) * self._rate + EARLY) + 1
-        self._next_frame = self._start + (due - EARLY) / self._rate
-        frame = self._frames
-        poses = self._poses(data)
+    def _add_frame(self, data: Any, row: int) -> None:
+        poses, frame = self._muscles.poses(data), self._frames
         self._positions[frame] = poses.xpos
         self._quaternions[frame] = poses.xquat
         self._frame_rows[frame] = row
-        self._paths.put(frame, *self._muscles.polylines(self._spacing))
-        self._contacts.put(frame, *self._muscles.contacts())
+        self._history.put_frame(frame, poses, self._options.spacing)
         self._frames = frame + 1
 
     def lay_out(self, stream: Stream) -> None:
         """Log what waits for the first frame: the layout, which looks at the muscles, and the welded bodies."""
-        stream.blueprint(blueprint(self._scene, self._paths.first(), self._positions[0, 1:]))
         if self._frames:
+            arms = np.abs(self._history.moment_arms(1, *self._crossing)[0])
+            parts = np.split(arms, np.cumsum(self._widths)[:-1]) if self._widths else []
+            first = First(self._history.polylines(1)[0], self._positions[0], parts)
+            if self._force_scale is None:
+                self._force_scale = ARROW * first.size / self._scene.strength
             self._scene.log_welded(stream, self._positions[0], self._quaternions[0])
+        else:
+            first = First(np.empty((0, 3)), np.empty((0, 3)), [])
+        stream.blueprint(blueprint(self._scene, first))
 
     def take(self) -> list[pa.RecordBatch]:
         """All rows as record batches; the buffers are empty afterwards."""
-        batches = []
-        if self._rows:
-            values = self._scalars[:, : self._rows]
-            cells = [column for quantity in values for column in columns.scalar_columns(quantity)]
-            batches.append(self._scalar_table.batch(self._time[: self._rows], cells))
+        batches = self._take_states() if self._rows else []
         if self._frames:
-            rows = self._frame_rows[: self._frames]
-            times, moving = self._time[rows], self._scene.moving
-            poses = (self._positions[: self._frames, moving], self._quaternions[: self._frames, moving])
-            colors = columns.activation_colors(self._scalars[-1][rows])
-            if moving:
-                batches.append(self._pose_table.batch(times, columns.pose_columns(*poses)))
-            cells = columns.path_columns(self._paths, self._contacts, colors)
-            batches.append(self._path_table.batch(times, cells))
+            batches += self._take_frames()
         self._rows = self._frames = 0
         return batches
+
+    def _take_states(self) -> list[pa.RecordBatch]:
+        times = self._time[: self._rows]
+        found = self._history.states(self._rows)
+        values = {name: found[name] for name in self._scene.measured}
+        values["power"] = -values["tension"] * values["velocity"]
+        lost = (values["status"] != Status.CONVERGED).astype(np.float64)
+        groups = {
+            "activation": self._summed(values["activation"]) / self._scene.group_sizes,
+            "tension": self._summed(values["tension"]),
+            "power": self._summed(values["power"]),
+            "without_path": self._summed(lost),
+        }
+        summed = [groups[name] for name in self._scene.group_series]
+        cells = [column for each in [*values.values(), *summed] for column in columns.scalar_columns(each)]
+        batches = [self._tables["scalars"].batch(times, cells)]
+        before = np.vstack([self._before, values["status"][:-1]])
+        rows, muscles = np.nonzero(values["status"] != before)
+        if len(rows):
+            codes = [Status(int(code)) for code in values["status"][rows, muscles]]
+            lines = [
+                f"{self._scene.muscle_names[i]}: {code.message}"
+                for i, code in zip(muscles, codes, strict=True)
+            ]
+            levels = ["INFO" if code == Status.CONVERGED else "WARN" for code in codes]
+            batches.append(self._tables["log"].batch(times[rows], columns.text_columns(lines, levels)))
+        self._before = values["status"][-1].copy()
+        return batches
+
+    def _summed(self, values: np.ndarray) -> np.ndarray:
+        """Sums of values (T, n) over each group, (T, groups)."""
+        order, starts = self._scene.by_group
+        return np.add.reduceat(values[:, order], starts, axis=1) if len(starts) else values
+
+    def _take_frames(self) -> list[pa.RecordBatch]:
+        rows, moving = self._frame_rows[: self._frames], self._scene.moving
+        times = self._time[rows]
+        batches = []
+        if moving:
+            poses = self._positions[: self._frames, moving], self._quaternions[: self._frames, moving]
+            batches.append(self._tables["poses"].batch(times, columns.pose_columns(*poses)))
+        if self._widths:
+            arms = self._history.moment_arms(self._frames, *self._crossing)
+            batches.append(
+                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths))
+            )
+        colors = columns.activation_colors(self._history.states(self._rows)["activation"][rows])
+        history, frames = self._history, self._frames
+        drawn = (
+            history.polylines(frames),
+            history.contacts(frames),
+            history.arrows(frames, self._force_scale or 1.0),
+        )
+        batches.append(self._tables["paths"].batch(times, columns.path_columns(*drawn, colors)))
+        return batches
+
+
+def _tables(scene: Scene) -> dict[str, columns.Table]:
+    scalars = [path for paths in [*scene.series.values(), *scene.group_series.values()] for path in paths]
+    return {
+        "scalars": columns.scalar_table(scalars),
+        "log": columns.text_table(LOG),
+        "poses": columns.pose_table([scene.bodies[body] for body in scene.moving]),
+        "moment_arms": columns.scalar_table(scene.moment_arms),
+        "paths": columns.path_table(scene.paths, scene.contacts, scene.forces),
+    }

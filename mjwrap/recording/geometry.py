@@ -14,7 +14,7 @@ PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
 DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
 WRAP_ALPHA = 0.35
 SMOOTH = 49  # points on the circles of a surface
-FLOOR_ALPHA = 0.15  # a plane without its texture would outshine everything
+FLOOR = 0.2  # brightness of a plane, which without its texture would outshine everything
 
 
 def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
@@ -40,7 +40,7 @@ def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
         return rr.Boxes3D(half_sizes=[size], **look)
     if kind == PLANE:
         # size 0 is an infinite plane; a thin slab just below the surface
-        rgba[3] = min(rgba[3], FLOOR_ALPHA)
+        rgba[:3] *= FLOOR
         look["colors"] = [rgba]
         sides = [side if side > 0 else float(model.stat.extent) for side in size[:2]]
         thickness = 1e-3 * float(model.stat.extent)

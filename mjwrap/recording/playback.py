@@ -43,8 +43,8 @@ def read_summary(path: str | os.PathLike[str]) -> Summary:
         raise RecordingError(f"there is no recording '{path}'")
     from rerun.chunk import RrdReader
 
-    from mjwrap.recording.columns import QUANTITIES, TIMELINE
-    from mjwrap.recording.scene import entity
+    from mjwrap.recording.columns import TIMELINE
+    from mjwrap.recording.scene import MEASURED, entity
     from mjwrap.recording.stream import APPLICATION
 
     try:
@@ -69,7 +69,7 @@ def read_summary(path: str | os.PathLike[str]) -> Summary:
     except (RuntimeError, ValueError) as error:
         raise RecordingError(f"'{path}' is not a complete recording: {error}") from error
     muscles = tuple(properties.get("muscles", [()])[0])
-    every = times.get("/" + entity(QUANTITIES[0], muscles[0]), []) if muscles else []
+    every = times.get("/" + entity(MEASURED[0], muscles[0]), []) if muscles else []
     seconds = 1e-9 * np.concatenate([*every, np.empty(0)])
     start, end = (float(seconds.min()), float(seconds.max())) if len(seconds) else (np.nan, np.nan)
     return Summary(path, properties["model"][0][0], muscles, entities, len(seconds), start, end)

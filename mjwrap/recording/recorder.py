@@ -2,9 +2,10 @@
 
 import math
 import os
+import time
 import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,63 +15,88 @@ from mjwrap.errors import RecordingError
 from mjwrap.output import PartFile, require, uninterrupted
 
 if TYPE_CHECKING:
-    from mjwrap.recording.frames import Buffers
+    from mjwrap.recording.scene import Scene
     from mjwrap.recording.stream import Stream
-    from mjwrap.system import MuscleSystem
+    from mjwrap.system.results import Results
 
 SUFFIX = ".rrd"
-BUFFERED = 250_000  # states of a muscle that are gathered unless the caller says otherwise; 8 MB
+BUFFERED = 40_000  # states of a muscle that are gathered unless the caller says otherwise; some 50 MB
+LIVE = 0.2  # seconds by the clock between two batches to a running viewer
 
 
 class Recorder:
-    """Record a simulation for rerun: the moving model, muscle paths coloured by activation, and time series.
+    """Record a simulation for rerun: the moving model, muscle paths coloured by activation, forces, and time series.
 
-    `model` is a mujoco.MjModel, `muscles` its MuscleSystem, `path` a file name that ends in .rrd. Bodies, paths and
-    contact points are taken `path_rate` times per second of simulated time [Hz], length [m], lengthening
-    speed [m/s], tension [N] and activation of every muscle at every `log`. `flush_every` calls are gathered before
-    they go to the file (None: 4000, fewer where there are many muscles); `spacing` [m] is the distance of points on
-    the curved parts of a path (None: as many as their curvature asks for).
+    `model` is a mujoco.MjModel; `muscles` its MuscleSystem, or `mjwrap.plugin.Muscles` of the data that a model with
+    the engine plugin moves; `path` a file name that ends in .rrd. `connect` streams to a running viewer, beside the
+    file or instead of it: True to one on this machine, or an address (rerun+http://HOST:PORT/proxy).
+
+    `rate` [Hz] states per second of simulated time are recorded (None: one at every `log`): length [m], lengthening
+    speed [m/s], tension [N], activation, power [W], fibre length [m], solver status and iterations of every muscle.
+    Bodies, paths, contact points, forces and moment arms are taken `path_rate` times [Hz]. `groups` says whose curves
+    stand together, {name: patterns of muscle names} (None: by the body that they move). `force_scale` [m/N] is the
+    length of an arrow (None: the strongest muscle's is three tenths of the size of all paths). `flush_every` states are
+    gathered before they go to the file (None: 2000, fewer where there are many muscles); `spacing` [m] is the distance
+    of points on the curved parts of a path (None: as many as their curvature asks for).
 
     The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
     Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
 
-    Raises RecordingError, before the run where `path` cannot be written, and from `log` or `close` where the
-    disk is full.
+    Raises RecordingError, before the run where `path` cannot be written or no viewer listens, and from `log` or
+    `close` where the disk is full, or the viewer is gone and there is no file.
     """
 
     def __init__(
         self,
         model: Any,
-        muscles: "MuscleSystem",
-        path: str | os.PathLike[str],
+        muscles: "Results",
+        path: str | os.PathLike[str] | None = None,
         *,
+        connect: bool | str = False,
+        rate: float | None = None,
         path_rate: float = 60.0,
+        groups: Mapping[str, str | Iterable[str]] | None = None,
+        force_scale: float | None = None,
         flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
+        require("rate", rate, rate is None or 0 < rate < math.inf, "a positive number of states per second")
         require("path_rate", path_rate, 0 < path_rate < math.inf, "a positive number of frames per second")
+        scaled = force_scale is None or 0 < force_scale < math.inf
+        require("force_scale", force_scale, scaled, "a positive length per force in metres per newton")
         require("flush_every", flush_every, flush_every is None or flush_every >= 1, "at least 1")
         require("spacing", spacing, spacing is None or 0 < spacing < math.inf, "a positive length in metres")
+        if path is None and not connect:
+            raise RecordingError("there is nowhere to record to: give a file name, or connect=True, or both")
         self._ended = ""  # why no more can be logged
-        self._target = PartFile(path, SUFFIX)
+        self._target = None if path is None else PartFile(path, SUFFIX)
+        self._live, self._batch_due = bool(connect), -math.inf
         try:
-            buffers, stream = _open(model, muscles, self._target, path_rate, flush_every, spacing)
+            scene, self._stream = _open(model, muscles, self._target, connect, groups)
         except BaseException:
-            self._target.discard()
+            if self._target:
+                self._target.discard()
             raise
-        self._buffers, self._stream, self._laid_out = buffers, stream, False
-        self._finalizer = weakref.finalize(self, _forgotten, self._target, stream)
+        from mjwrap.recording.frames import Buffers, Options
+
+        rows = flush_every or int(np.clip(BUFFERED // max(1, muscles.n), 250, 2000))
+        self._buffers = Buffers(scene, muscles, rows, Options(rate, path_rate, spacing, force_scale))
+        self._place = str(connect if self._target is None else self._target.path)
+        self._laid_out = False
+        self._finalizer = weakref.finalize(self, _forgotten, self._place, self._target, self._stream)
 
     def log(self, data: Any) -> None:
-        """Record the state that `muscles` last saw; `data` is the mujoco.MjData that it belongs to.
+        """Record the state that `muscles` last saw, where one is due; `data` is the mujoco.MjData that it belongs to.
 
         Raises RecordingError where the disk is full, where time runs backwards (after a reset: one recording
         is one run), and after `close`.
         """
         if self._ended:
-            raise RecordingError(f"cannot log to '{self._target.path}': {self._ended}")
+            raise RecordingError(f"cannot log to '{self._place}': {self._ended}")
         self._buffers.add(data)
-        if self._buffers.full:
+        if not self._laid_out:
+            self._guarded(self._lay_out)
+        if self._buffers.full or (self._live and time.perf_counter() >= self._batch_due):
             self._guarded(self._flush)
 
     def close(self) -> None:
@@ -92,16 +118,21 @@ class Recorder:
         else:
             self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is a recording
 
-    def _flush(self) -> None:
+    def _lay_out(self) -> None:
         if not self._laid_out:
             self._buffers.lay_out(self._stream)
             self._laid_out = True
+
+    def _flush(self) -> None:
         self._stream.send(self._buffers.take())
+        self._batch_due = time.perf_counter() + LIVE
 
     def _finish(self) -> None:
+        self._lay_out()
         self._flush()
         self._stream.finish()
-        self._target.publish()
+        if self._target:
+            self._target.publish()
         self._ended = "it is closed"
         self._finalizer.detach()
 
@@ -120,27 +151,26 @@ class Recorder:
         self._ended = why
         self._finalizer.detach()
         self._stream.abandon()
-        self._target.discard()
+        if self._target:
+            self._target.discard()
 
 
 def _open(
     model: Any,
-    muscles: "MuscleSystem",
-    target: PartFile,
-    rate: float,
-    rows: int | None,
-    spacing: float | None,
-) -> tuple["Buffers", "Stream"]:
-    """Start the file; rerun loads here and nowhere earlier."""
+    muscles: "Results",
+    target: PartFile | None,
+    connect: bool | str,
+    groups: Mapping[str, str | Iterable[str]] | None,
+) -> tuple["Scene", "Stream"]:
+    """Start the file or the connection; rerun loads here and nowhere earlier."""
     try:
-        from mjwrap.recording.frames import Buffers
         from mjwrap.recording.scene import Scene, model_name
-        from mjwrap.recording.stream import Stream
+        from mjwrap.recording.stream import VIEWER, Stream
     except ImportError as error:
         raise RecordingError(f"cannot record: {error}; install rerun with: pip install rerun-sdk") from error
-    scene = Scene(model, muscles)
+    scene = Scene(model, muscles, groups)
     name = model_name(model)
-    stream = Stream(target, name)
+    stream = Stream(target, VIEWER if connect is True else connect or None, name)
     try:
         stream.properties(model=name, muscles=scene.muscle_names, timestep=float(model.opt.timestep))
         scene.log_static(stream)
@@ -148,15 +178,15 @@ def _open(
     except BaseException:
         stream.abandon()
         raise
-    rows = rows or int(np.clip(BUFFERED // max(1, muscles.n), 250, 4000))
-    return Buffers(scene, muscles, rate, rows, spacing), stream
+    return scene, stream
 
 
-def _forgotten(target: PartFile, stream: "Stream") -> None:
+def _forgotten(place: str, target: PartFile | None, stream: "Stream") -> None:
     stream.abandon()
-    target.discard()
+    if target:
+        target.discard()
     warnings.warn(
-        f"the Recorder of '{target.path}' was never closed, so nothing was kept; use it in a with statement",
+        f"the Recorder of '{place}' was never closed, so nothing was kept; use it in a with statement",
         RuntimeWarning,
         stacklevel=2,
     )

@@ -1,41 +1,71 @@
 """Names and static contents of a recording: which entity stands for which body, geom, site and muscle."""
 
 from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import rerun as rr
 
-from mjwrap.recording.columns import QUANTITIES
 from mjwrap.recording.geometry import draws, geom_shape, pose, surface_shape
+from mjwrap.recording.groups import Group, crossed_coordinates, given_groups, moved_groups
 from mjwrap.recording.stream import Stream
+
+MEASURED = ("length", "velocity", "tension", "activation", "status", "iterations")  # of every muscle
+FIBER = "fiber_length"  # where some muscle has fibres
+SUMMED = {"activation": "mean", "tension": "sum", "power": "sum", "without_path": "number"}  # over a group
 
 SITE_COLORS = {"origins": (60, 200, 90), "insertions": (250, 160, 40), "via_points": (235, 235, 235)}
 CONTACT_COLOR = (250, 230, 60)
-# eight hues that stay apart on black and on white
+FORCE_COLOR = (80, 220, 220)
+# hues that stay apart on black and on white: eight for the muscles of a page, four more for groups
 SERIES_COLORS = np.array(
     [
         (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40),
         (148, 103, 189), (188, 189, 34), (23, 190, 207), (227, 119, 194),
+        (174, 199, 232), (255, 187, 120), (152, 223, 138), (160, 130, 110),
     ],
     dtype=np.uint8,
 )  # fmt: skip
+PAGE = 8  # muscles whose curves are shown together
 CROWDED = 40  # muscles from which lines and points are drawn thinner
+STRONGEST = 1e6  # a muscle beyond that [N] has no strength that says anything
 VISIBLE_GROUPS = 3  # MuJoCo's viewer shows geom groups 0 to 2; later ones hold collision shapes
 
 
 class Scene:
     """Entity paths of everything in `model` that the recording shows."""
 
-    def __init__(self, model: Any, muscles: Any) -> None:
+    def __init__(
+        self, model: Any, muscles: Any, groups: Mapping[str, str | Iterable[str]] | None = None
+    ) -> None:
         self.model = model
         self.declarations = list(muscles.declarations)
         self.muscle_names = _distinct([str(name) for name in muscles.names], "muscle")
         self.paths = [entity("world", "muscles", name, "path") for name in self.muscle_names]
         self.contacts = [entity("world", "muscles", name, "contacts") for name in self.muscle_names]
-        self.series = {q: [entity(q, name) for name in self.muscle_names] for q in QUANTITIES}
+        self.forces = [entity("world", "forces", name) for name in self.muscle_names]
+        fibers = any(hasattr(muscle.parameters, "optimal_fiber_length") for muscle in self.declarations)
+        self.measured = [*MEASURED, FIBER] if fibers else [*MEASURED]
+        self.series = {q: [entity(q, name) for name in self.muscle_names] for q in [*self.measured, "power"]}
         body_names = _distinct([model.body(i).name for i in range(model.nbody)], "body")
         self.bodies = [entity("world", "bodies", name) for name in body_names]
+        joint_names = _distinct([model.joint(i).name for i in range(model.njnt)], "joint")
+        self.coordinates = crossed_coordinates(model, self.declarations, joint_names)
+        self.moment_arms = [entity("moment_arm", coordinate.name) for coordinate in self.coordinates]
+        self.groups = self._grouped(body_names, groups)
+        self.group_series = {q: [entity("groups", q, group.name) for group in self.groups] for q in SUMMED}
+        self.group_sizes = np.array([len(group.members) for group in self.groups], dtype=np.int64)
+        # the muscles in the order of the groups, and where each group begins
+        order = [i for group in self.groups for i in group.members]
+        self.by_group = np.array(order, dtype=np.int64), np.cumsum([0, *self.group_sizes])[:-1]
+        self.pages = [_pages(group) for group in self.groups]
+        # each muscle's colour: that of its place in its page
+        self.colors = np.empty((len(self.muscle_names), 3), dtype=np.uint8)
+        for page in (page for pages in self.pages for page in pages):
+            self.colors[page] = SERIES_COLORS[: len(page)]
+        strengths = [muscle.parameters.strength for muscle in self.declarations]
+        self.strength = max((s for s in strengths if s < STRONGEST), default=1e3)
         geom_names = _distinct([model.geom(i).name for i in range(model.ngeom)], "geom")
         self.geoms = [
             f"{self.bodies[model.geom_bodyid[i]]}/{entity('geoms', name)}"
@@ -61,6 +91,16 @@ class Scene:
         self.shown = sorted(shown - {0})
         self.moving = [body for body in self.shown if _moves(model, body)]
 
+    def _grouped(
+        self, body_names: list[str], groups: Mapping[str, str | Iterable[str]] | None
+    ) -> list[Group]:
+        """The groups that were asked for, or one of all muscles that fit a page, or by the body they move."""
+        if groups is not None:
+            return given_groups(groups, self.muscle_names)
+        if len(self.muscle_names) <= PAGE:
+            return [Group("muscles", list(range(len(self.muscle_names))))] if self.muscle_names else []
+        return moved_groups(self.model, self.declarations, body_names)
+
     def log_static(self, stream: Stream) -> None:
         """Log geoms, muscle sites and the looks of lines, points and curves."""
         stream.static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -76,13 +116,22 @@ class Scene:
             stream.static(path, points)
         line = rr.LineStrips3D.from_fields(radii=self._radius(2.0))
         dots = rr.Points3D.from_fields(colors=[CONTACT_COLOR], radii=self._radius(3.0))
-        for path, contact in zip(self.paths, self.contacts, strict=True):
+        arrows = rr.Arrows3D.from_fields(colors=[FORCE_COLOR], radii=self._radius(3.0))
+        for path, contact, force in zip(self.paths, self.contacts, self.forces, strict=True):
             stream.static(path, line)
             stream.static(contact, dots)
+            stream.static(force, arrows)
         for i, name in enumerate(self.muscle_names):
-            curve = rr.SeriesLines(colors=[SERIES_COLORS[i % len(SERIES_COLORS)]], names=[name], widths=[1.5])
-            for quantity in QUANTITIES:
-                stream.static(self.series[quantity][i], curve)
+            curve = _curves([name], self.colors[[i]])
+            for entities in self.series.values():
+                stream.static(entities[i], curve)
+        for i, group in enumerate(self.groups):
+            curve = _curves([group.name], SERIES_COLORS[[i % len(SERIES_COLORS)]])
+            for entities in self.group_series.values():
+                stream.static(entities[i], curve)
+        for path, coordinate in zip(self.moment_arms, self.coordinates, strict=True):
+            names = [self.muscle_names[i] for i in coordinate.muscles]
+            stream.static(path, _curves(names, self.colors[coordinate.muscles]))
 
     def log_welded(self, stream: Stream, positions: np.ndarray, quaternions: np.ndarray) -> None:
         """Log the poses (nbody, 3), (nbody, 4) w-x-y-z of bodies that are fixed in the world."""
@@ -112,6 +161,16 @@ class Scene:
                 radii=self._radius(2.5 if kind == "via_points" else 4.0),
             )
         return points
+
+
+def _curves(names: list[str], colors: np.ndarray) -> rr.SeriesLines:
+    return rr.SeriesLines(colors=colors, names=names, widths=[1.5] * len(names))
+
+
+def _pages(group: Group) -> list[list[int]]:
+    """The muscles of a group, spread evenly over pages."""
+    parts = np.array_split(group.members, -(-len(group.members) // PAGE))
+    return [[int(i) for i in part] for part in parts]
 
 
 def entity(*parts: str) -> str:

@@ -1,7 +1,9 @@
-"""One recording stream of rerun into a file, with errors that are raised."""
+"""One recording stream of rerun, into a file or to a running viewer, with errors that are raised."""
 
+import socket
 import warnings
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 import pyarrow as pa
 import rerun as rr
@@ -15,21 +17,33 @@ if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
 APPLICATION = "mjwrap"
+VIEWER = "rerun+http://127.0.0.1:9876/proxy"  # where a viewer listens unless it is told otherwise
 
 
 class Stream:
-    """A recording stream into a `PartFile`; `send`, `wait` and `finish` raise RecordingError where it cannot grow."""
+    """A recording stream into a `PartFile`, to the viewer at an address, or both.
 
-    def __init__(self, target: PartFile, name: str) -> None:
-        self._target = target
+    `send`, `wait` and `finish` raise RecordingError where the file cannot grow, or where the viewer is gone and there
+    is no file; beside a file, a viewer that goes away is a warning.
+    """
+
+    def __init__(self, target: PartFile | None, url: str | None, name: str) -> None:
+        self._target, self._url = target, url
         self._recording = rr.RecordingStream(APPLICATION)
         if not self._recording.is_enabled():
             raise RecordingError(
-                f"cannot record to '{target.path}': rerun is switched off by the environment variable RERUN; "
-                "unset it or set RERUN=on"
+                f"cannot record to '{target.path if target else url}': rerun is switched off by the environment "
+                "variable RERUN; unset it or set RERUN=on"
             )
-        self._pipe = FilePipe(target.part) if FilePipe.AVAILABLE else None
-        self._recording.save(self._pipe.address if self._pipe else target.part)
+        self._pipe = FilePipe(target.part) if target and FilePipe.AVAILABLE else None
+        self._lost = False  # the viewer is gone
+        sinks: list[rr.FileSink | rr.GrpcSink] = []
+        if target:
+            sinks.append(rr.FileSink(self._pipe.address if self._pipe else target.part))
+        if url:
+            _require_viewer(url)
+            sinks.append(rr.GrpcSink(url))
+        self._recording.set_sinks(*sinks)
         if self._pipe:
             self._pipe.connected()
         rr.send_recording_name(name, recording=self._recording)
@@ -58,24 +72,28 @@ class Stream:
                 rr.send_record_batch(batch, recording=self._recording)
 
     def wait(self) -> None:
-        """Return once everything sent is on its way to the file."""
+        """Return once everything sent is on its way to the file, or with the viewer."""
         try:
             self._recording.flush()
         except (RuntimeError, ValueError, OSError) as error:
-            raise self._target.failure(error) from error
+            if self._url is None or "gRPC" not in str(error):
+                raise self._failure(error) from error
+            self._viewer_gone(error)
         self._check()
 
     def finish(self) -> None:
-        """Write the table of contents, close the file and read that table back."""
+        """Write the table of contents of a file, close it and read that table back."""
         self.wait()
         self._disconnect()
         self._check()
+        if self._target is None:
+            return
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # rerun warns of a missing table, and store() raises for it
                 RrdReader(self._target.part).store()
         except (RuntimeError, ValueError, OSError) as error:
-            raise self._target.failure(error) from error
+            raise self._failure(error) from error
 
     def abandon(self) -> None:
         """Close the file, complete or not."""
@@ -88,4 +106,33 @@ class Stream:
 
     def _check(self) -> None:
         if self._pipe and self._pipe.error:
-            raise self._target.failure(self._pipe.error) from self._pipe.error
+            raise self._failure(self._pipe.error) from self._pipe.error
+
+    def _failure(self, error: Exception) -> RecordingError:
+        if self._target is None:
+            return RecordingError(f"recording to '{self._url}' failed: {error}")
+        return self._target.failure(error)
+
+    def _viewer_gone(self, error: Exception) -> None:
+        if self._target is None:
+            raise RecordingError(f"the viewer at {self._url} is gone: {error}") from error
+        if not self._lost:
+            self._lost = True
+            warnings.warn(
+                f"the viewer at {self._url} is gone; the recording to '{self._target.path}' goes on",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+
+
+def _require_viewer(url: str) -> None:
+    """Raise RecordingError where nothing listens at an address: rerun itself would wait for it."""
+    try:
+        parts = urlsplit(url)
+        if not (parts.scheme in ("rerun+http", "rerun+https") and parts.hostname and parts.path == "/proxy"):
+            raise ValueError(f"an address looks like {VIEWER}")
+        socket.create_connection((parts.hostname, parts.port or 9876), timeout=5.0).close()
+    except (OSError, ValueError) as error:
+        raise RecordingError(
+            f"cannot connect to a viewer at '{url}': {error}; start one first: python -m rerun_cli"
+        ) from error

@@ -12,7 +12,7 @@ from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels import evaluation, readiness
 from mjwrap.mjcf import has_plugin, read_declarations
 from mjwrap.paths import Status
-from mjwrap.plan import build_plan, last_dofs
+from mjwrap.plan import build_plan
 from mjwrap.system.checks import check_state, ends_inside
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
@@ -25,6 +25,8 @@ TOLERANCE = 1e-10  # largest tangency error of a path
 class Evaluator(Results):
     """The muscles of a model, what is known of each mjData, and one evaluation of all paths, states and tensions."""
 
+    _last: State
+
     def __init__(self, model: mujoco.MjModel, *, strict: bool = False) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ModelError(
@@ -35,23 +37,17 @@ class Evaluator(Results):
                 "mjwrap's engine plugin drives the muscles of this model already (install): mj_step moves it, and "
                 "mjwrap.plugin.read(data) reads it; for a MuscleSystem compile a spec without the plugin"
             )
-        self.model = model
         self.strict = strict
         self._takeover = Takeover(model)
         with self._takeover.suspended():
             found = read_declarations(model)
-        super().__init__(found, build_plan(model, found.muscles), model)
+        plan = build_plan(model, found.muscles)
+        super().__init__(found, plan, model, State(model, plan))
         self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
         self._states: dict[int, State] = {}
         self._groups_off = 0
         self._off = np.zeros(self._plan.n, dtype=np.bool_)
         self._excitation: Array = np.zeros(self._plan.n)
-        self._root = np.asarray(model.body_rootid, dtype=np.int64)
-        self._parent = np.asarray(model.body_parentid, dtype=np.int64)
-        self._last_dof = last_dofs(model)
-        self._dofs = tuple(
-            np.asarray(a, dtype=np.int64) for a in (model.body_dofadr, model.body_dofnum, model.dof_parentid)
-        )
 
     @property
     def excitation(self) -> Array:

@@ -10,8 +10,9 @@ from mjwrap.errors import GeometryError
 from mjwrap.kernels import coupling, drawing, layout, segments
 from mjwrap.mjcf import Declarations, MuscleDeclaration
 from mjwrap.paths import Status
-from mjwrap.plan import Plan
-from mjwrap.system.state import State
+from mjwrap.plan import Plan, last_dofs
+from mjwrap.system.history import History
+from mjwrap.system.state import Evaluation
 
 Array = NDArray[np.float64]
 
@@ -22,11 +23,22 @@ class Results:
     declarations: what the model declares, one per muscle; native: muscle actuators that stay with MuJoCo, and why.
     """
 
-    def __init__(self, found: Declarations, plan: Plan, model: mujoco.MjModel) -> None:
+    def __init__(self, found: Declarations, plan: Plan, model: mujoco.MjModel, last: Evaluation) -> None:
+        self.model = model
         self.declarations: list[MuscleDeclaration] = found.muscles
         self.native: dict[str, str] = found.native
         self._plan = plan
-        self._last = State(model, plan)
+        self._last = last
+        self._root = np.asarray(model.body_rootid, dtype=np.int64)
+        self._parent = np.asarray(model.body_parentid, dtype=np.int64)
+        self._last_dof = last_dofs(model)
+        self._dofs = tuple(
+            np.asarray(a, dtype=np.int64) for a in (model.body_dofadr, model.body_dofnum, model.dof_parentid)
+        )
+
+    def _evaluation(self) -> Evaluation:
+        """Return what was last evaluated, as it is: not a copy."""
+        return self._last
 
     @property
     def n(self) -> int:
@@ -41,32 +53,38 @@ class Results:
     @property
     def length(self) -> Array:
         """Musculotendon lengths (n,) [m]."""
-        return self._last.length.copy()
+        return self._evaluation().length.copy()
 
     @property
     def velocity(self) -> Array:
         """Lengthening speeds (n,) [m/s]."""
-        return self._last.velocity.copy()
+        return self._evaluation().velocity.copy()
 
     @property
     def tension(self) -> Array:
         """Tensions (n,) [N], never negative."""
-        return self._last.tension.copy()
+        return self._evaluation().tension.copy()
 
     @property
     def activation(self) -> Array:
         """Activations (n,) [-]."""
-        return self._last.activation.copy()
+        return self._evaluation().activation.copy()
 
     @property
     def fiber_length(self) -> Array:
         """Fibre lengths (n,) [m], 0 for a law without fibres; along the fibre, so longer than its reach if pennate."""
-        return self._last.fiber.copy()
+        return self._evaluation().fiber.copy()
 
     @property
     def status(self) -> NDArray[np.int64]:
         """Codes of `mjwrap.Status` (n,)."""
-        return self._last.status.copy()
+        return self._evaluation().status.copy()
+
+    @property
+    def iterations(self) -> NDArray[np.int64]:
+        """Iterations (n,) that the search for the paths took, those of all routes of a muscle together."""
+        counts = self._evaluation().info[:, layout.I_ITERATIONS]
+        return np.bincount(self._plan.routes[:, coupling.R_MUSCLE], counts, self.n).astype(np.int64)
 
     @property
     def tangency_error(self) -> Array:
@@ -78,12 +96,12 @@ class Results:
     @property
     def time(self) -> float:
         """Simulation time [s] to which all results belong."""
-        return self._last.time
+        return self._evaluation().time
 
     @property
     def failures(self) -> NDArray[np.int64]:
         """Number of steps (n,) at which a muscle's path was not found and its last good force was held."""
-        return self._last.failures.copy()
+        return self._evaluation().failures.copy()
 
     def index(self, name: str) -> int:
         """Return the index of a muscle by name; `GeometryError` lists the names where there is no such muscle."""
@@ -93,8 +111,8 @@ class Results:
 
     def reason(self, i: int) -> str:
         """Return why muscle i last had no path, with the elements at fault; empty if it always had one."""
-        code = int(self._last.last_failure[i])
-        detail = self._last.details[i]
+        code = int(self._evaluation().last_failure[i])
+        detail = self._evaluation().details[i]
         return (Status(code).message + (f" ({detail})" if detail else "")) if code else ""
 
     def report(self) -> str:
@@ -117,16 +135,15 @@ class Results:
     def _polylines(self, spacing: float | None, only: int) -> tuple[Array, NDArray[np.int64]]:
         if spacing is not None and not (np.isfinite(spacing) and spacing > 0.0):
             raise GeometryError(f"spacing must be finite and positive [m], not {spacing!r}")
-        state = self._last
+        state, step = self._evaluation(), 0.0 if spacing is None else float(spacing)
         starts = np.zeros(self.n + 1, dtype=np.int64)
-        given = (self._plan.routes, state.node, state.segments, state.count, state.info)
-        tail = (0.0 if spacing is None else float(spacing), only)
-        out = np.empty((drawing.polylines(*given, *tail, np.empty((0, 3)), starts), 3))
-        drawing.polylines(*given, *tail, out, starts)
+        given = (self._plan.routes, state.node, state.segments, state.count, state.info, step, only)
+        out = np.empty((drawing.polylines(*given, np.empty((0, 3)), starts), 3))
+        drawing.polylines(*given, out, starts)
         return out, starts
 
     def _contacts(self, only: int) -> tuple[Array, NDArray[np.int64]]:
-        state = self._last
+        state = self._evaluation()
         starts = np.zeros(self.n + 1, dtype=np.int64)
         given = (self._plan.routes, state.node, state.segments, state.count, only)
         out = np.empty((drawing.contacts(*given, np.empty((0, 3)), starts), 3))
@@ -153,9 +170,17 @@ class Results:
         """Return the contact points of all muscles, P and Q in turn: points (m, 3), starts (n + 1,)."""
         return self._contacts(-1)
 
+    def poses(self, data: mujoco.MjData) -> mujoco.MjData:
+        """Return the data whose kinematics the results belong to: `data` itself."""
+        return data
+
+    def history(self, rows: int) -> History:
+        """Return room for `rows` states and frames of the muscles, which may be read together later."""
+        return History(self, rows)
+
     def forces(self, i: int) -> list[tuple[int, Array, Array]]:
         """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""
-        state, plan = self._last, self._plan
+        state, plan = self._evaluation(), self._plan
         found = []
         for c in np.flatnonzero(plan.routes[:, coupling.R_MUSCLE] == self._known(i)):
             pull = state.tension[i] * plan.weights[c]

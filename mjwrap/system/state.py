@@ -1,30 +1,47 @@
-"""What belongs to one mjData: warm starts, results, and what was added to its xfrc_applied."""
+"""What belongs to one mjData: results, warm starts, and what was added to its xfrc_applied."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjwrap.kernels import layout, segments
 from mjwrap.plan import Plan
 
+NUMBERS = (
+    "activation",
+    "fiber_length",
+    "length",
+    "velocity",
+    "tension",
+)  # of every muscle, as `Results` names them
 
-class State:
-    """What belongs to one mjData: warm starts, results, and what was added to its xfrc_applied."""
 
-    def __init__(self, model: mujoco.MjModel, plan: Plan) -> None:
-        n, routes = plan.n, len(plan.routes)
-        self.node = plan.node.copy()
-        self.segments = np.zeros((len(plan.node) + routes, segments.SEGMENT))
+class Evaluation:
+    """What one evaluation of all muscles leaves: paths, states and tensions, as the kernels write them."""
+
+    def __init__(self, n: int, node: NDArray[np.float64], routes: int) -> None:
+        self.node = node
+        self.segments = np.zeros((len(node) + routes, segments.SEGMENT))
         self.count = np.zeros(routes, dtype=np.int64)
         self.info = np.zeros((routes, layout.INFO))
-        self.length, self.velocity, self.tension, self.activation, self.fiber = (
-            np.zeros(n) for _ in range(5)
-        )
+        self.numbers = np.zeros((len(NUMBERS), n))
+        self.activation, self.fiber, self.length, self.velocity, self.tension = self.numbers
         self.status = np.zeros(n, dtype=np.int64)
         self.failures = np.zeros(n, dtype=np.int64)
         self.last_failure = np.zeros(n, dtype=np.int64)
         self.details = [""] * n  # which elements are to blame for the last failure
+        self.time = 0.0
+        self.evaluated = False
+
+
+class State(Evaluation):
+    """What belongs to one mjData: an evaluation, warm starts, and what was added to its xfrc_applied."""
+
+    def __init__(self, model: mujoco.MjModel, plan: Plan) -> None:
+        n = plan.n
+        super().__init__(n, plan.node.copy(), len(plan.routes))
         self.drive, self.start_activation, self.start_fiber, self.start_length = (
             np.zeros(n) for _ in range(4)
         )
@@ -33,8 +50,6 @@ class State:
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)
         self.scratch = mujoco.MjData(model)
-        self.time = 0.0
-        self.evaluated = False
         self.applied: float | None = None  # time of an `apply` whose states are still to be advanced
         self.in_scratch = False  # whether the last evaluation read its poses there, or in the caller's data
 
@@ -42,8 +57,7 @@ class State:
         """Start cold: no branch, no last force, no failures."""
         self.node[:, layout.S_MODE] = layout.COLD
         self.count[:] = 0
-        for array in (self.length, self.velocity, self.tension, self.activation, self.fiber, self.own):
-            array[:] = 0.0
+        self.numbers[:], self.own[:] = 0.0, 0.0
         self.status[:] = 0
         self.failures[:] = 0
         self.evaluated, self.applied = False, None
