@@ -15,7 +15,7 @@ from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.plan import Plan
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing as dr
-from mjwrap.plugin.callbacks import stage
+from mjwrap.plugin.callbacks import saving
 from mjwrap.plugin.callbacks.hooks import Entries
 from mjwrap.plugin.offsets import offsets
 from mjwrap.plugin.transmission import transmission_part
@@ -34,11 +34,11 @@ def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
 
 
 def state_size(plan: Plan) -> int:
-    """Return how many numbers of plugin_state the muscles of a plan need; `stage.py` says what they are."""
-    numbers = 1 + stage.PER_MUSCLE * plan.n + 13 * len(loaded_bodies(plan))
+    """Return how many numbers of plugin_state the muscles of a plan need; `saving.py` says what they are."""
+    numbers = 1 + saving.PER_MUSCLE * plan.n + 13 * len(loaded_bodies(plan))
     for low, high, surfaces in plan.routes[:, [coupling.R_LO, coupling.R_HI, coupling.R_SURFACES]]:
         if surfaces:
-            numbers += int(surfaces * stage.SAVED + 1 + (high - low + 1) * segments.SEGMENT)
+            numbers += int(surfaces * saving.SAVED + 1 + (high - low + 1) * segments.SEGMENT)
     return numbers
 
 

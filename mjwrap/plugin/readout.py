@@ -14,7 +14,7 @@ from mjwrap.errors import StateError
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import transmission as tr
-from mjwrap.plugin.callbacks.stage import PER_MUSCLE
+from mjwrap.plugin.callbacks.saving import PER_MUSCLE
 
 Array = NDArray[np.float64]
 _COLUMNS = ("length", "velocity", "tension", "activation", "fiber", "status", "failures")  # of the block

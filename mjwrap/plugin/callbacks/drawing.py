@@ -30,8 +30,8 @@ from mjwrap.plugin.callbacks.memory import (
     singles,
     word,
 )
+from mjwrap.plugin.callbacks.saving import floats, ints, sizes
 from mjwrap.plugin.callbacks.stage import GROUPS as SWITCHES
-from mjwrap.plugin.callbacks.stage import _floats, _ints, _sizes
 
 WIDTH = 0.003  # of a muscle without a tendon [m]: MuJoCo's default
 THINNED = 2.0**-26  # factor on the width of a tendon that MuJoCo is not to show, see `placeholders.py`
@@ -208,14 +208,14 @@ def draw(block, model, option, scene):
     actuators = byte(option + _at(block, bk.D_ACTUATOR)) != 0
     if not tendons and not actuators:
         return
-    n, nodes, routes, _ = _sizes(block)
-    route = _ints(block, bk.A_ROUTES, (routes, ROUTE))
-    node = _floats(block, bk.A_NODE, (nodes, lay.ROW)).copy()
-    seg = _floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT))
-    count, info = _ints(block, bk.A_COUNT, (routes,)), _floats(block, bk.A_INFO, (routes, lay.INFO))
-    activation, drive = _floats(block, bk.A_ACTIVATION, (n,)), _floats(block, bk.A_DRIVE, (n,))
-    tendon, actuator = _ints(block, bk.A_TENDON, (n,)), _ints(block, bk.A_ACTUATOR, (n,))
-    low, high = _floats(block, bk.A_CTRL_LOW, (n,)), _floats(block, bk.A_CTRL_HIGH, (n,))
+    n, nodes, routes, _ = sizes(block)
+    route = ints(block, bk.A_ROUTES, (routes, ROUTE))
+    node = floats(block, bk.A_NODE, (nodes, lay.ROW)).copy()
+    seg = floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT))
+    count, info = ints(block, bk.A_COUNT, (routes,)), floats(block, bk.A_INFO, (routes, lay.INFO))
+    activation, drive = floats(block, bk.A_ACTIVATION, (n,)), floats(block, bk.A_DRIVE, (n,))
+    tendon, actuator = ints(block, bk.A_TENDON, (n,)), ints(block, bk.A_ACTUATOR, (n,))
+    low, high = floats(block, bk.A_CTRL_LOW, (n,)), floats(block, bk.A_CTRL_HIGH, (n,))
     switched = half(model + _at(block, bk.DISABLEACTUATOR))
     by_activation = byte(option + _at(block, bk.D_ACTIVATION)) != 0
     wanted = half(option + _at(block, bk.D_LABEL))

@@ -1,0 +1,145 @@
+"""An instance's part of plugin_state, and how the block's arrays are read from it and written to it.
+
+Numbers in plugin_state, per instance: the time at which the last step ended; activation and fibre length of muscles
+that keep them nowhere else (n, 2); excitations (n,); length, velocity and tension (3, n) and the segments of the last
+good paths; the saved solution and the hint of every surface; what is in xfrc_applied now. Zeros are a cold start: so a
+state made by hand is as good as one that MuJoCo has reset.
+"""
+
+from __future__ import annotations
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels import segments as sg
+from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.memory import reals, word, words
+
+PER_MUSCLE = 6
+SAVED = lay.STATE + 4  # of a surface: the solution, then the hint
+
+
+@jit
+def floats(block, which, shape):
+    return reals(block + word(block + 8 * which), shape)
+
+
+@jit
+def ints(block, which, shape):
+    return words(block + word(block + 8 * which), shape)
+
+
+@jit
+def state_of(block, data):
+    """Return the instance's part of plugin_state."""
+    start = word(data + word(block + 8 * bk.PLUGIN_STATE)) + 8 * word(block + 8 * bk.STATE_ADDRESS)
+    return reals(start, (word(block + 8 * bk.NSTATE),))
+
+
+@jit
+def sizes(block):
+    """Return the numbers of muscles, nodes, routes and bodies."""
+    n, nodes = word(block + 8 * bk.MUSCLES), word(block + 8 * bk.NODES)
+    return n, nodes, word(block + 8 * bk.ROUTES), word(block + 8 * bk.BODIES)
+
+
+@jit
+def load(block, state):
+    """Read own states, excitations, last lengths and forces, and the surfaces' warm starts from plugin_state.
+
+    Modes are stored as their distance from COLD, so that zeros are cold.
+    """
+    n, nodes, routes, _ = sizes(block)
+    node, links = floats(block, bk.A_NODE, (nodes, lay.ROW)), ints(block, bk.A_LINKS, (nodes, 4))
+    route = ints(block, bk.A_ROUTES, (routes, ROUTE))
+    own, excitation = floats(block, bk.A_OWN, (n, 2)), floats(block, bk.A_EXCITATION, (n,))
+    length, velocity = floats(block, bk.A_LENGTH, (n,)), floats(block, bk.A_VELOCITY, (n,))
+    tension = floats(block, bk.A_TENSION, (n,))
+    at = 1
+    for m in range(n):
+        own[m, 0], own[m, 1], excitation[m] = state[at], state[at + 1], state[at + 2]
+        length[m], velocity[m], tension[m] = state[at + 3], state[at + 4], state[at + 5]
+        at += PER_MUSCLE
+    for c in range(routes):
+        if route[c, R_SURFACES] == 0:
+            continue  # a path of straight segments is always found
+        for k in range(route[c, R_LO], route[c, R_HI]):
+            if links[k, L_GEOM] < 0:
+                continue
+            node[k, lay.S_MODE] = state[at] + lay.COLD
+            for i in range(1, lay.STATE):
+                node[k, lay.S_MODE + i] = state[at + i]
+            for i in range(4):
+                node[k, lay.HINT + i] = state[at + lay.STATE + i]
+            at += SAVED
+        at += _room(c, route)
+
+
+@jit
+def _room(c, route):
+    """Return how many numbers of plugin_state the segments of route c have: their count, then a row for each."""
+    return 1 + sg.SEGMENT * (route[c, R_HI] - route[c, R_LO] + 1)
+
+
+@jit
+def _copy(count, origin, first, target, place):
+    """Copy numbers from origin[first:] to target[place:], through views: else every index is checked for its sign."""
+    taken, given = origin[first:], target[place:]
+    for i in range(count):
+        given[i] = taken[i]
+
+
+@jit
+def load_held(block, state):
+    """Read the segments of the last good paths of the routes that have none now."""
+    n, nodes, routes, _ = sizes(block)
+    route, info = ints(block, bk.A_ROUTES, (routes, ROUTE)), floats(block, bk.A_INFO, (routes, lay.INFO))
+    seg, count = (
+        floats(block, bk.A_SEG, ((nodes + routes) * sg.SEGMENT,)),
+        ints(block, bk.A_COUNT, (routes,)),
+    )
+    at = 1 + PER_MUSCLE * n
+    for c in range(routes):
+        if route[c, R_SURFACES] == 0:
+            continue
+        at += SAVED * route[c, R_SURFACES]
+        if info[c, lay.I_STATUS] != lay.CONVERGED:
+            most = route[c, R_HI] - route[c, R_LO] + 1
+            fits = 0.0 <= state[at] <= most  # anybody may write to plugin_state
+            count[c] = int(state[at]) if fits else 0
+            _copy(sg.SEGMENT * count[c], state, at + 1, seg, sg.SEGMENT * (route[c, R_LO] + c))
+        at += _room(c, route)
+
+
+@jit
+def save(block, state):
+    """Write what `load` and `load_held` read, but for the excitations, which are the user's."""
+    n, nodes, routes, _ = sizes(block)
+    node, links = floats(block, bk.A_NODE, (nodes, lay.ROW)), ints(block, bk.A_LINKS, (nodes, 4))
+    seg, count = (
+        floats(block, bk.A_SEG, ((nodes + routes) * sg.SEGMENT,)),
+        ints(block, bk.A_COUNT, (routes,)),
+    )
+    route, own = ints(block, bk.A_ROUTES, (routes, ROUTE)), floats(block, bk.A_OWN, (n, 2))
+    length, velocity = floats(block, bk.A_LENGTH, (n,)), floats(block, bk.A_VELOCITY, (n,))
+    tension = floats(block, bk.A_TENSION, (n,))
+    at = 1
+    for m in range(n):
+        state[at], state[at + 1] = own[m, 0], own[m, 1]
+        state[at + 3], state[at + 4], state[at + 5] = length[m], velocity[m], tension[m]
+        at += PER_MUSCLE
+    for c in range(routes):
+        if route[c, R_SURFACES] == 0:
+            continue
+        for k in range(route[c, R_LO], route[c, R_HI]):
+            if links[k, L_GEOM] < 0:
+                continue
+            state[at] = node[k, lay.S_MODE] - lay.COLD
+            for i in range(1, lay.STATE):
+                state[at + i] = node[k, lay.S_MODE + i]
+            for i in range(4):
+                state[at + lay.STATE + i] = node[k, lay.HINT + i]
+            at += SAVED
+        state[at] = count[c]
+        _copy(sg.SEGMENT * count[c], seg, sg.SEGMENT * (route[c, R_LO] + c), state, at + 1)
+        at += _room(c, route)
