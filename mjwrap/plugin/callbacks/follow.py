@@ -64,20 +64,23 @@ def _living(block, model, which):
 
 
 @jit
-def _match(live, at, mine, to, count, write):
-    """Return in which bits words of two arrays differ, or copy them."""
+def _match(live, at, mine, to, count):
+    """Return in which bits words of two arrays differ."""
     changes = 0
     for i in range(count):
-        if write:
-            mine[to + i] = live[at + i]
-        else:
-            changes |= live[at + i] ^ mine[to + i]
+        changes |= live[at + i] ^ mine[to + i]
     return changes
 
 
 @jit
-def _laws(block, model, write):
-    """Compare MuJoCo's muscle laws and the limits of controls with the model's; copy them, or say whether they differ.
+def _copy(live, at, mine, to, count):
+    for i in range(count):
+        mine[to + i] = live[at + i]
+
+
+@jit
+def _laws(block, model):
+    """Make MuJoCo's muscle laws and the limits of controls the model's.
 
     Limits of force are the marks that `Takeover` leaves behind gainprm and biasprm; all numbers as words, to the bit.
     """
@@ -89,26 +92,37 @@ def _laws(block, model, write):
     high = words(block + word(block + 8 * bk.A_CTRL_HIGH), (n,))
     gain, bias, lengths = _living(block, model, 0), _living(block, model, 1), _living(block, model, 2)
     acc0, gear, limits = _living(block, model, 3), _living(block, model, 4), _living(block, model, 5)
-    changes = 0
     for m in range(n):
         a, o, follows = drives[m, D_ACTUATOR], drives[m, D_OUTPUT], drives[m, D_FOLLOWS]
+        row, c = m * PARAMS, 2 * control[m]
         if follows & CONTROL != 0:
-            changes |= _match(limits, 2 * control[m], low, m, 1, write)
-            changes |= _match(limits, 2 * control[m] + 1, high, m, 1, write)
+            changes = _match(limits, c, low, m, 1) | _match(limits, c + 1, high, m, 1)
+            if changes != 0:
+                low[m], high[m] = limits[c], limits[c + 1]
         if a < 0:
             continue
-        row = m * PARAMS
-        changes |= _match(gain, PRM * a, params, row, 9, write)
-        changes |= _match(gain, PRM * a + 9, params, row + law.LIMITS, 1, write)
-        changes |= _match(bias, PRM * a + 9, params, row + law.LIMITS + 1, 1, write)
-        changes |= _match(lengths, 2 * o, params, row + law.RANGE, 2, write)
-        changes |= _match(gear, GEARS * o, params, row + law.GEAR, 1, write)
+        changes = _match(gain, PRM * a, params, row, 9)
+        changes |= _match(gain, PRM * a + 9, params, row + law.LIMITS, 1)
+        changes |= _match(bias, PRM * a + 9, params, row + law.LIMITS + 1, 1)
+        changes |= _match(lengths, 2 * o, params, row + law.RANGE, 2)
+        changes |= _match(acc0, o, params, row + law.ACC0, 1)
+        changes |= _match(gear, GEARS * o, params, row + law.GEAR, 1)
         if follows & BIAS != 0:
-            changes |= _match(bias, PRM * a, params, row + law.PASSIVE, 4, write)
-            changes |= _match(bias, PRM * a + 5, params, row + law.PASSIVE + 4, 1, write)
-            changes |= _match(bias, PRM * a + 7, params, row + law.PASSIVE + 5, 1, write)
-        changes |= _match(acc0, o, params, row + law.ACC0, 1, write)
-    return changes != 0
+            changes |= _match(bias, PRM * a, params, row + law.PASSIVE, 4)
+            changes |= _match(bias, PRM * a + 5, params, row + law.PASSIVE + 4, 1)
+            changes |= _match(bias, PRM * a + 7, params, row + law.PASSIVE + 5, 1)
+        if changes == 0:
+            continue
+        _copy(gain, PRM * a, params, row, 9)
+        _copy(gain, PRM * a + 9, params, row + law.LIMITS, 1)
+        _copy(bias, PRM * a + 9, params, row + law.LIMITS + 1, 1)
+        _copy(lengths, 2 * o, params, row + law.RANGE, 2)
+        _copy(acc0, o, params, row + law.ACC0, 1)
+        _copy(gear, GEARS * o, params, row + law.GEAR, 1)
+        if follows & BIAS != 0:
+            _copy(bias, PRM * a, params, row + law.PASSIVE, 4)
+            _copy(bias, PRM * a + 5, params, row + law.PASSIVE + 4, 1)
+            _copy(bias, PRM * a + 7, params, row + law.PASSIVE + 5, 1)
 
 
 @jit
@@ -157,18 +171,16 @@ def _bind(block, model):
 def follow(block, model):
     """Make the muscles' arrays those of the model as it is now."""
     other = word(block + 8 * bk.MODEL) != model
-    laws = _laws(block, model, False)
+    _laws(block, model)
     plain = _differs(block, bk.A_PLAIN, bk.A_PLAIN_SEEN, bk.PLAIN, model)
     derived = _differs(block, bk.A_DERIVED, bk.A_DERIVED_SEEN, bk.DERIVED, model)
-    if not (laws or plain or derived or other):
+    if not (plain or derived or other):
         return
     store_word(block + 8 * bk.MODEL, model)
     if derived or (other and _other_structure(block, model)):
         call(word(block + 8 * bk.REBUILD), block, model, word(block + 8 * bk.INSTANCE))
         _note(block, bk.A_DERIVED, bk.A_DERIVED_SEEN, bk.DERIVED, 8, model)
         _note(block, bk.A_STRUCTURE, bk.A_STRUCTURE_SEEN, bk.STRUCTURE, 1, model)
-    if laws:
-        _laws(block, model, True)
     if plain:
         _bind(block, model)
         _note(block, bk.A_PLAIN, bk.A_PLAIN_SEEN, bk.PLAIN, 8, model)
