@@ -253,6 +253,7 @@ def test_a_model_without_muscles_runs(tmp_path: Path, capsys: pytest.CaptureFixt
             "--video shows the muscles of the engine plugin",
         ),
         ([ELBOW, "--video", "{folder}/f.avi"], r"\.mp4|OpenGL"),
+        ([ELBOW, "--video", "{folder}/f.gif", "--video-size", "640"], "like 640x480"),
         ([ELBOW, "--mode", "sideways"], "mode 'sideways' does not exist; modes: wrench"),
         ([ELBOW, "--excitation", "{text}.sto"], r"text\.xml\.sto'.*no such file"),
         ([ELBOW, "--csv", "{folder}/c.csv", "--plot", "{folder}/missing/p.png"], "missing"),
@@ -411,11 +412,12 @@ def test_the_plugin_moves_the_model_to_the_same_places(
 
 
 def test_a_film_shows_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A frame for each thirtieth of a second; the motion is the same as without it."""
+    """Frames at the asked rate, half as fast as the run; the motion is the same as without it."""
     image = pytest.importorskip("PIL.Image", reason="GIFs need Pillow")
     film, table, alone = tmp_path / "f.gif", tmp_path / "t.npz", tmp_path / "a.npz"
     options = ["--duration", 0.2, "--excitation", "constant:0.5"]
-    ran = simulate(capsys, ELBOW, *options, "--video", film, "--out", table)
+    size = ["--video-size", "96x64", "--fps", 20, "--speed", 0.5]
+    ran = simulate(capsys, ELBOW, *options, "--video", film, *size, "--out", table)
     if "OpenGL" in ran.err:
         pytest.skip(ran.err)
     assert ran.code == 0, ran.err
@@ -423,7 +425,9 @@ def test_a_film_shows_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert f"video:     {film}" in ran.out
     with image.open(film) as frames:
         seconds = sum(frames.seek(k) or frames.info["duration"] for k in range(frames.n_frames)) / 1e3
-    assert seconds == pytest.approx(0.2, abs=0.05)
+        assert frames.size == (96, 64)
+        assert frames.n_frames in (8, 9)
+    assert seconds == pytest.approx(0.4, abs=0.06)
     assert simulate(capsys, ELBOW, *options, "--mode", "wrench", "--out", alone).code == 0
     assert np.array_equal(mw.read_table(table).values, mw.read_table(alone).values)
 

@@ -34,3 +34,11 @@ def at_least(least: int) -> Callable[[str], int]:
 
     whole.__name__ = "whole number"
     return whole
+
+
+def pixels(text: str) -> tuple[int, int]:
+    """Read WIDTHxHEIGHT, from 1 to 16384 pixels each."""
+    width, _, height = text.partition("x")
+    if not (width.isdigit() and height.isdigit() and all(1 <= int(x) <= 16384 for x in (width, height))):
+        raise argparse.ArgumentTypeError(f"'{text}' is no size in pixels; write it like 640x480")
+    return int(width), int(height)

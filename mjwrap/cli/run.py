@@ -32,7 +32,7 @@ from typing import TypeVar
 import mujoco
 
 from mjwrap import Recorder, Status, __version__
-from mjwrap.cli.arguments import at_least, positive
+from mjwrap.cli.arguments import at_least, pixels, positive
 from mjwrap.cli.engine import MODES, Engine, PluginEngine, start_engine
 from mjwrap.cli.errors import INTERRUPTED, UserError
 from mjwrap.cli.history import History
@@ -81,8 +81,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="time between samples (default %(default)s s)",
     )
     add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
+    add("--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo (mp4, gif)")
+    add("--video-size", type=pixels, default=(640, 480), metavar="WxH", help="of the film (default 640x480)")
+    add("--fps", type=positive, default=30.0, metavar="N", help="frames a second of the film (default 30)")
     add(
-        "--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo at 30 frames a second (mp4, gif)"
+        "--speed",
+        type=positive,
+        default=1.0,
+        metavar="X",
+        help="simulated seconds a second of it (default 1)",
     )
     add("--camera", metavar="NAME", help="a camera of the model, for the film (default: all of the model)")
     add(
@@ -154,7 +161,15 @@ def open_outputs(
     if isinstance(engine, PluginEngine) and options.video:
         from mjwrap import Video  # with MuJoCo's renderer
 
-        film = stack.enter_context(opened(lambda: Video(engine.model, options.video, camera=options.camera)))
+        width, height = options.video_size
+        film = stack.enter_context(
+            opened(
+                lambda: Video(
+                    engine.model, options.video, fps=options.fps, speed=options.speed, width=width,
+                    height=height, camera=options.camera,
+                )
+            )
+        )  # fmt: skip
         logs.append(lambda _: film.log(engine.fresh()))
     if plot is not None:
         history = History(muscles)
