@@ -276,6 +276,28 @@ def test_tables_of_another_program_are_compared_with_both(
     assert "moment arm, turn" in page.read_text(encoding="utf-8")
 
 
+def test_tables_that_mjwrap_wrote_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Another joint's moment arms are no muscle's."""
+    table = tmp_path / "t.npz"
+    ran = run_here("run", capsys, ELBOW, "--duration", 0.1, "--excitation", "constant:0.3", "--out", table,
+                   "--columns", "qpos,length,moment_arm")  # fmt: skip
+    assert ran.code == 0, ran.err
+    given = ["--states", table, "--lengths", table, "--moment-arms", f"elbow_flexion={table}"]
+    ran = compare(capsys, ELBOW, "--samples", 3, "--duration", 0, "--json", "-", *given)
+    assert ran.code == 0, ran.err
+    told = [d for d in json.loads(ran.out)["tables"] if d["program"] == "mjwrap"]
+    assert len(told) == 14
+    assert max(abs(d["largest"]) for d in told) < 1e-12
+
+
+def test_mujoco_that_does_not_load_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "foo")
+    done = finish(start("inspect", ELBOW))
+    assert done.code == 2
+    assert "MUJOCO_GL=foo" in done.err
+    assert len(done.err.splitlines()) == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [

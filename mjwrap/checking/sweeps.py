@@ -134,5 +134,5 @@ class Sweeper:
                 probe(at + side)
                 touched.append(len(muscles.contact_points(i)))
             what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
-            found[at] = f"{at:.6f}: {what}; {touched[0]} surfaces touched, then {touched[1]}"
+            found[at] = f"{at:.6f}: {what}; touched surfaces {touched[0]}, then {touched[1]}"
         return list(found.items())

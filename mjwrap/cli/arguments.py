@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 def positive(text: str) -> float:
     """Return a finite number above zero, for argparse."""
-    value = float(text)
+    value = _number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text} must be a finite number above zero")
     return value
@@ -17,10 +17,17 @@ def positive(text: str) -> float:
 
 def not_negative(text: str) -> float:
     """Return a finite number, zero or more, for argparse."""
-    value = float(text)
+    value = _number(text)
     if not (math.isfinite(value) and value >= 0.0):
         raise argparse.ArgumentTypeError(f"{text} must be a finite number, zero or more")
     return value
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
 
 
 def at_least(least: int) -> Callable[[str], int]:

@@ -113,6 +113,7 @@ def execute(options: argparse.Namespace) -> int:
     given = read_tables(options, model, muscles, start)
     if plot is not None or page is not None:
         need_matplotlib()
+    tables = compare_tables(model, *given) if given is not None else []
     rows = PoseTable(table) if table is not None else None
     found = compare_all(model, names, options, start, rows)
     verdicts = {
@@ -125,7 +126,6 @@ def execute(options: argparse.Namespace) -> int:
     if rows is not None:
         rows.close()
 
-    tables = compare_tables(model, *given) if given is not None else []
     tell_tables(report.say, tables)
     motion = None
     if options.duration > 0.0:

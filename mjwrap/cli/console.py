@@ -81,7 +81,18 @@ def _say(name: str, error: object, code: int) -> int:
 @contextlib.contextmanager
 def _quiet(name: str) -> Iterator[None]:
     """Show each warning once, in a line on standard error, and leave no MUJOCO_LOG.TXT behind."""
-    import mujoco  # here, so that help needs none of it
+    try:
+        import mujoco  # here, so that help needs none of it
+    except (
+        RuntimeError,
+        AttributeError,
+    ) as error:  # what MuJoCo raises where MUJOCO_GL fits nothing installed
+        backend = os.environ.get("MUJOCO_GL")
+        if backend is None:
+            raise
+        raise UserError(
+            f"MuJoCo does not load with MUJOCO_GL={backend}: {error}; unset it, or try egl"
+        ) from None
 
     seen: set[str] = set()
 

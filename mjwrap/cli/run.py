@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=0.005,
         metavar="S",
-        help="time between samples (default %(default)s s)",
+        help="time between samples, rounded to whole time steps (default %(default)s s)",
     )
     add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
     add("--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo (mp4, gif)")
@@ -111,6 +111,12 @@ def execute(options: argparse.Namespace) -> int:
         raise UserError(
             "--video shows the muscles of the engine plugin: leave --mode out, or let it be wrench"
         )
+    if options.mode not in MODES:
+        raise UserError(f"mode '{options.mode}' does not exist; modes: {', '.join(MODES)}")
+    if options.camera and not options.video:
+        raise UserError("--camera is for a film: it goes with --video")
+    if options.columns != USUAL and not (options.out or options.csv):
+        raise UserError("--columns says what a table holds: it goes with --out or --csv")
     engine = start_engine(options.model, options.mode, options.strict)
     for model in {id(m): m for m in (engine.model, engine.muscles.model)}.values():
         if options.timestep is not None:
@@ -243,6 +249,8 @@ def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: floa
     report.say(
         f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     )
+    if not muscles.n and not muscles.native:
+        report.say("the model declares no muscle that mjwrap could drive; only MuJoCo moved it")
     if muscles.native:
         report.say(f"{len(muscles.native)} stay with MuJoCo's own tendons:")
         for name, reason in muscles.native.items():

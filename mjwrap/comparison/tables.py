@@ -55,9 +55,9 @@ def compare_tables(
     """Return how far MuJoCo's tendons and mjwrap's paths are from tables, muscle by muscle.
 
     time (T,), qpos (T, nq): the motion; a table's rows are looked up in it, with straight lines between. Columns are
-    muscles, a path before the name is left out; moment_arms: by the joint's name, positive where the muscle's tension
-    increases the coordinate. A tendon that only holds a place for another route is not compared. Raises `TableError`
-    where a table has none of the muscles, or rows outside the motion.
+    muscles, a path before the name is left out, and so are the marks of `mjwrap run --columns`; moment_arms: by the
+    joint's name, positive where the muscle's tension increases the coordinate. A tendon that only holds a place for
+    another route is not compared. Raises `TableError` where a table has none of the muscles, or rows outside the motion.
     """
     model = pristine(model)
     found: list[TableDifference] = []
@@ -74,7 +74,7 @@ def _compare(
     dof = _dof(model, joint) if joint else -1
     muscles = MuscleSystem(model)
     known = [*muscles.names, *muscles.native]
-    columns = {name.rsplit("/", 1)[-1]: table[name] for name in table.names}
+    columns = {_muscle_of(name, joint): table[name] for name in table.names}
     if not set(columns) & set(known):
         raise TableError(
             f"'{table.source}' has no column for any of the muscles; columns: {', '.join(list(columns)[:8])}; "
@@ -138,6 +138,13 @@ def _tendons(muscles: MuscleSystem) -> dict[str, int]:
         if actuator >= 0 and int(model.actuator_trntype[actuator]) == int(mujoco.mjtTrn.mjTRN_TENDON):
             found[name] = int(model.actuator_trnid[actuator, 0])
     return found
+
+
+def _muscle_of(column: str, joint: str) -> str:
+    """Return the muscle that a column is of: /forceset/MUSCLE, length:MUSCLE, moment_arm:MUSCLE:JOINT."""
+    if not joint:
+        return column.rsplit("/", 1)[-1].removeprefix("length:")
+    return column.rsplit("/", 1)[-1].removeprefix("moment_arm:").removesuffix(f":{joint}")
 
 
 def _dof(model: mujoco.MjModel, joint: str) -> int:
