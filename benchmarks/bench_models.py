@@ -32,6 +32,7 @@ import mjwrap as mw
 from mjwrap.plugin import read
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.library import library
+from mjwrap.plugin.readout import block_address
 
 BLOCK = 20  # steps between two looks at the clock, and between two changes of the controls
 RUN = 25  # blocks of a run, the first of which is not timed
@@ -154,7 +155,7 @@ def profile(label: str, mode: str) -> Row:
         times.append([*spent, native.block(ours.data.ctrl), ours.block(ours.data.ctrl)])
     without, loaded, whole = np.array(times).T
     mujoco.mj_forward(ours.model, ours.data)
-    block = int(np.asarray(ours.data.plugin_data)[0])
+    block = block_address(ours.data, 0)
     head = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
     kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
     compute, advance = kind(int(head[bk.STAGE])), kind(int(head[bk.FINISH]))

@@ -242,6 +242,11 @@ class ActuatorForce:
         """Return 0: its states are MuJoCo's."""
         return 0
 
+    @property
+    def strength(self) -> float:
+        """Return infinity: only MuJoCo knows how hard its actuator pulls."""
+        return math.inf
+
     def row(self) -> tuple[float, ...]:
         """Return the parameter of `path_actuator` in `mjwrap/kernels/muscle.py`: no force."""
         return (0.0,)

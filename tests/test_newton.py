@@ -120,7 +120,8 @@ def test_a_lone_wrap_is_the_path_that_newtons_method_finds(surface: mw.Surface) 
         a = np.array([0.13 * np.cos(2.0 + 9.0 * time), 0.13 * np.sin(2.0 + 9.0 * time), high])
         b = np.array([0.11 + 0.03 * np.sin(20.0 * time), -0.02, 0.06 * np.sin(5.0 * time)])
         for row, node in enumerate((direct, iterated)):
-            chain.solve_chain(0, 1, *a, *b, node, 1e-10, row == 0, info, row)
+            ends = (*a, *b)
+            chain.solve_chain(0, 1, *ends, node, 1e-10, row == 0, info, row)  # pyright: ignore[reportCallIssue]
         assert info[0, lay.I_STATUS] == info[1, lay.I_STATUS]
         seen.append((int(info[0, lay.I_STATUS]), float(direct[0, lay.S_MODE])))
         if seen[-1][0] != lay.CONVERGED:

@@ -17,6 +17,7 @@ from mujoco import batch, rollout
 from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, native_spec, start
 
 import mjwrap as mw
+from mjwrap.errors import ModelError
 from mjwrap.plugin import excitations, install, load, native, read
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -393,3 +394,14 @@ def test_an_installed_model_has_no_muscle_system() -> None:
     model = mw.install(mujoco.MjSpec.from_file(str(ELBOW)))
     with pytest.raises(mw.ModelError, match="engine plugin drives the muscles"):
         mw.MuscleSystem(model)
+
+
+def test_a_saved_model_has_its_mode(tmp_path: Path) -> None:
+    model = install(spec_of(SCENES[next(iter(SCENES))]))
+    file = tmp_path / "m.mjb"
+    mujoco.mj_saveModel(model, str(file))
+    for mode in (None, "wrench"):
+        assert load(file, mode).nplugin == 1
+    for mode in ("transmission", "sideways"):
+        with pytest.raises(ModelError, match="was saved with mode 'wrench'"):
+            load(file, mode)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import gc
+import os
+import pickle
 import resource
 import subprocess
 import sys
@@ -16,7 +18,7 @@ import numpy as np
 import pytest
 from test_plugin import SCENES, moving, spec_of, state_of
 
-from mjwrap.plugin import install
+from mjwrap.plugin import install, load, read
 
 ROOT = Path(__file__).resolve().parent.parent
 RELOAD = """
@@ -34,6 +36,23 @@ other = mujoco.MjData(again)
 mujoco.mj_step(again, other, nstep=20)
 mujoco.mj_step(model, data, nstep=10)
 assert (other.qpos == data.qpos).all() and data.qpos.any()
+"""
+
+
+UNPICKLED = """
+import pickle, sys
+import mujoco, mjwrap as mw
+model = mw.load("models/elbow/elbow.xml")
+others = [mujoco.MjData(model) for _ in range(3)]
+with open(sys.argv[1], "rb") as file:
+    data, wanted = pickle.load(file)
+for _ in range(2):
+    again = pickle.loads(pickle.dumps(data))
+    mujoco.mj_step(model, again, nstep=50)
+    assert (again.qpos == wanted).all()
+    mujoco.mj_resetData(model, again)
+mujoco.mj_step(model, data, nstep=50)
+assert (data.qpos == wanted).all()
 """
 
 
@@ -127,3 +146,35 @@ def test_nothing_grows() -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     use(2000)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 4096  # kB
+
+
+def test_pickled_data_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+    """Here, while the original lives and after, and in another process; a copy that is never stepped hurts nobody."""
+    model = load(ROOT / "models/elbow/elbow.xml")
+    data, fresh = mujoco.MjData(model), mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.ctrl[:] = 0.3
+    mujoco.mj_step(model, data, nstep=50)
+    saved = pickle.dumps(data)
+    wanted = pickle.loads(saved)
+    mujoco.mj_step(model, data, nstep=50)
+    mujoco.mj_step(model, wanted, nstep=50)
+    assert np.array_equal(state_of(wanted), state_of(data))
+    assert read(wanted).status.tolist() == [0] * 7
+    unused = [pickle.loads(saved) for _ in range(5)]
+    del data
+    gc.collect()
+    mujoco.mj_step(model, fresh, nstep=20)
+    for other in (pickle.loads(saved), unused[2], copy.copy(unused[3])):
+        mujoco.mj_step(model, other, nstep=50)
+        assert np.array_equal(state_of(other), state_of(wanted))
+        mujoco.mj_resetData(model, other)
+        mujoco.mj_step(model, other, nstep=20)
+        assert np.array_equal(state_of(other), state_of(fresh))
+    file = tmp_path / "data.pkl"
+    file.write_bytes(pickle.dumps((pickle.loads(saved), np.array(wanted.qpos))))
+    done = subprocess.run(
+        [sys.executable, "-X", "faulthandler", "-c", UNPICKLED, str(file)],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr

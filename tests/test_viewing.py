@@ -22,6 +22,7 @@ from mjwrap.errors import VersionError
 from mjwrap.plugin import install, offsets, viewing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.library import library
+from mjwrap.plugin.readout import block_address
 
 VIS, CAT, OBJ, GEOM = mujoco.mjtVisFlag, mujoco.mjtCatBit, mujoco.mjtObj, mujoco.mjtGeom
 EPS = 2e-7  # of a number in single precision
@@ -342,7 +343,7 @@ def test_drawing_changes_nothing(integrator: int) -> None:
     for _ in range(40):
         mujoco.mj_step(model, watched)
         mujoco.mj_step(model, alone)
-        block = int(np.asarray(watched.plugin_data)[0])
+        block = block_address(watched, 0)
         size = ctypes.c_int64.from_address(block + 8 * bk.BYTES).value
         before = ctypes.string_at(block, size)
         mujoco.mjv_updateScene(model, watched, option, None, mujoco.MjvCamera(), int(CAT.mjCAT_ALL), scene)

@@ -57,7 +57,8 @@ def compare_tables(
     time (T,), qpos (T, nq): the motion; a table's rows are looked up in it, with straight lines between. Columns are
     muscles, a path before the name is left out, and so are the marks of `mjwrap run --columns`; moment_arms: by the
     joint's name, positive where the muscle's tension increases the coordinate. A tendon that only holds a place for
-    another route is not compared. Raises `TableError` where a table has none of the muscles, or rows outside the motion.
+    another route is not compared. Raises `TableError` where a table has none of the muscles, or rows outside the
+    motion.
     """
     model = pristine(model)
     found: list[TableDifference] = []

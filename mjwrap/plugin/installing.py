@@ -61,7 +61,15 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
         ]
         muscles = [muscle for muscle in declared if muscle.name not in taken]
         if not muscles and not taken:
-            also = ", and no actuator on a spatial tendon" if mode == reg.TRANSMISSION else ""
+            also = (
+                ", and no actuator on a spatial tendon"
+                if mode == reg.TRANSMISSION
+                else (
+                    "; other actuators on spatial tendons are driven with mode='transmission'"
+                    if spec.tendons
+                    else ""
+                )
+            )
             raise ModelError(f"the model declares no muscle that mjwrap could drive{also}")
         actuators = {element.id: element for element in spec.actuators}
         for muscle in muscles:
@@ -81,14 +89,27 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     return model
 
 
-def load(path: str | os.PathLike[str], mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
-    """Load an MJCF file with its muscles in the engine plugin (`install`), or an MJB file of a model that has it."""
+def load(
+    path: str | os.PathLike[str], mode: str | None = None, *, keep_tendons: bool = False
+) -> mujoco.MjModel:
+    """Load an MJCF file with its muscles in the engine plugin (`install`), or an MJB file of a model that has it.
+
+    mode: "wrench" if None; an MJB file has one of its own, and another is a `ModelError`. keep_tendons: of MJCF files.
+    """
     reg.register()
     model = read_model(path)
     if Path(path).suffix != ".mjb":
-        return install(mujoco.MjSpec.from_file(os.fspath(path)), mode, keep_tendons=keep_tendons)
+        spec = mujoco.MjSpec.from_file(os.fspath(path))
+        return install(spec, mode or reg.WRENCH, keep_tendons=keep_tendons)
     names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
-    if not any(name.endswith(reg.INSTANCE) for name in names):
+    mine = [i for i, name in enumerate(names) if name.endswith(reg.INSTANCE)]
+    modes = {reg.claim_of(model._address, i).mode for i in mine}
+    if mine and mode is not None and modes != {mode}:
+        raise ModelError(
+            f"{path} was saved with mode '{', '.join(sorted(modes))}', and an MJB file cannot be changed; leave out "
+            f"mode '{mode}', or load its XML"
+        )
+    if not mine:
         raise ModelError(
             f"{path} has no plugin of mjwrap, and an MJB file cannot be changed; load its XML instead"
         )

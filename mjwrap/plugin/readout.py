@@ -48,7 +48,10 @@ def instances(model: mujoco.MjModel) -> list[int]:
 
 def block_address(data: mujoco.MjData, instance: int) -> int:
     """Return the address of an instance's block."""
-    return int(np.asarray(data.plugin_data)[instance])
+    address = reg.block_address(data._address, instance)
+    if address == 0:
+        raise StateError("this mjData has no muscles of the engine plugin: it was made without them")
+    return address
 
 
 def head_of(block: int) -> NDArray[np.int64]:

@@ -19,12 +19,14 @@ from typing import Any, NamedTuple
 from urllib.parse import quote, unquote
 
 import mujoco
+import numpy as np
 
 from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf import MuscleDeclaration, read_declarations
 from mjwrap.mjcf.names import PLUGIN_INSTANCE as INSTANCE
 from mjwrap.plan import Plan, build_plan
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import owners
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries, compile_hooks
 from mjwrap.plugin.copies import copy_of
 from mjwrap.plugin.fingerprint import fingerprint
@@ -210,10 +212,33 @@ def _init(model: int, data: int, instance: int) -> int:
         block = _raw_malloc(len(image))
         ctypes.memmove(block, image, len(image))
         ctypes.c_int64.from_address(block + 8 * bk.MODEL).value = model
-        slot.value = block
+        slot.value = _enter(data, instance, block)
     except Exception as error:
         return _failed(error)
     return 0
+
+
+def _enter(data: int, instance: int, block: int) -> int:
+    """Enter a block into the table of `callbacks/owners.py`; return its place there."""
+    table = owners.TABLE
+    with _LOCK:
+        used = table[0]
+        entries = np.ctypeslib.as_array(table)[1 : 1 + owners.ENTRY * (used + 1)].reshape(-1, owners.ENTRY)
+        entry = int(np.argmin(entries[:, owners.OWNER] != 0))  # the first that is free
+        if entry >= owners.CAPACITY - 1:
+            raise MemoryError(f"more than {owners.CAPACITY - 1} mjData with muscles at once")
+        entries[entry, [owners.INSTANCE, owners.BLOCK]] = instance, block
+        entries[entry, owners.OWNER] = data
+        table[0] = max(used, entry + 1)
+    return entry + 1
+
+
+def block_address(data: int, instance: int) -> int:
+    """Return the address of the block of an instance of the mjData at an address, 0 where it has none."""
+    table = owners.TABLE
+    entries = np.ctypeslib.as_array(table)[1 : 1 + owners.ENTRY * table[0]].reshape(-1, owners.ENTRY)
+    mine = (entries[:, owners.OWNER] == data) & (entries[:, owners.INSTANCE] == instance)
+    return int(entries[mine, owners.BLOCK][0]) if mine.any() else 0
 
 
 def _rebuild(block: int, model: int, instance: int) -> None:

@@ -15,7 +15,8 @@ from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st
 from mjwrap.plugin.callbacks._cache import callback, jit
-from mjwrap.plugin.callbacks.memory import call, call_with_four, half, store_word, word
+from mjwrap.plugin.callbacks.memory import call, call_with_four, store_word, word
+from mjwrap.plugin.callbacks.owners import block_at, block_of_state, leave, place_of
 
 _WORD, _INT = types.int64, types.int32
 
@@ -65,9 +66,7 @@ def compile_entries() -> Entries:
 @jit
 def _block(data, instance, nplugin, plugin_data):
     """Return the address of an instance's block, 0 where there is none."""
-    if instance >= half(data + nplugin):
-        return 0
-    return word(word(data + plugin_data) + 8 * instance)
+    return block_at(place_of(data, instance, nplugin, plugin_data))
 
 
 def compile_hooks(offsets: dict[str, int]) -> Hooks:
@@ -75,9 +74,11 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
     nplugin, plugin_data = offsets["nplugin"], offsets["plugin_data"]
 
     def destroy(data, instance):
-        block = _block(data, instance, nplugin, plugin_data)
-        if block != 0:
+        place = place_of(data, instance, nplugin, plugin_data)
+        if place != 0:
+            block = block_at(place)
             store_word(word(data + plugin_data) + 8 * instance, 0)
+            leave(place)
             call(word(block + 8 * bk.FREE), block, 0, 0)
 
     def copy(target, model, origin, instance):
@@ -89,7 +90,8 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
             for i in range(word(given) // 8):
                 store_word(to + 8 * i, word(given + 8 * i))
 
-    def reset(model, state, block, instance):
+    def reset(model, state, place, instance):
+        block = block_of_state(place, instance, state) if place != 0 else 0
         if block != 0:
             st.forget(block, state)
 

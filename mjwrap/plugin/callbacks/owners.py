@@ -1,0 +1,120 @@
+"""Which block belongs to which mjData: a table that every callback asks, since plugin_data may be a copy.
+
+Unpickling an mjData, here or in another process, copies the original's plugin_data over its own. So a slot holds no
+address, only the place of an entry in this table, from 1 on; an entry that is not the mjData's own says that the slot
+is a copy, and the right one is looked for and written there. `mjwrap/plugin/register.py` fills the table, under a
+lock; an entry without an owner is free.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba.core import cgutils, types
+
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.memory import half, intrinsic, store_word, word
+
+CAPACITY = 1 << 16  # entries
+OWNER, INSTANCE, BLOCK, ENTRY = (
+    0,
+    1,
+    2,
+    3,
+)  # words of an entry: address of the mjData or 0, instance, its block
+_SYMBOL = "mjwrap.plugin.owners"
+
+
+def _table_of_the_process() -> Any:
+    """Return the table: a word, how many entries have been used at once, then these. It outlives this module."""
+    kind = ctypes.c_int64 * (1 + ENTRY * CAPACITY)
+    address = llvm.address_of_symbol(_SYMBOL)
+    if address is None:
+        table = kind()
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(table))
+        address = ctypes.addressof(table)
+        llvm.add_symbol(_SYMBOL, address)
+    return kind.from_address(address)
+
+
+TABLE = _table_of_the_process()
+
+
+@intrinsic
+def _table(typing_context: Any) -> Any:
+    """Return the address of the table: a symbol, so that machine code in the cache serves every process."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [])
+        symbol = cgutils.get_or_insert_function(builder.module, kind, _SYMBOL)
+        return builder.ptrtoint(symbol, ir.IntType(64))
+
+    return types.int64(), generate
+
+
+@jit
+def _entry(place):
+    """Return the address of an entry, place from 1 on."""
+    return _table() + 8 + 8 * ENTRY * (place - 1)
+
+
+@jit
+def _owned(place, data, instance):
+    """Return whether a place in the table is one, and its entry an instance's of this mjData."""
+    if place < 1 or place >= CAPACITY:
+        return False
+    entry = _entry(place)
+    return word(entry + 8 * OWNER) == data and word(entry + 8 * INSTANCE) == instance
+
+
+@jit
+def place_of(data, instance, nplugin, plugin_data):
+    """Return the place of an instance's entry, 0 where it has none; a slot that was copied is mended."""
+    if instance >= half(data + nplugin):
+        return 0
+    slot = word(data + plugin_data) + 8 * instance
+    place = word(slot)
+    if place == 0 or _owned(place, data, instance):
+        return place
+    for other in range(1, word(_table()) + 1):
+        if _owned(other, data, instance):
+            store_word(slot, other)
+            return other
+    return 0
+
+
+@jit
+def block_at(place):
+    """Return the address of an entry's block, 0 for no place."""
+    return word(_entry(place) + 8 * BLOCK) if place != 0 else 0
+
+
+@jit
+def leave(place):
+    """Give an entry back."""
+    store_word(_entry(place) + 8 * OWNER, 0)
+
+
+@jit
+def _keeps(place, instance, state):
+    """Return whether an entry is that of the instance whose numbers in plugin_state start at an address."""
+    entry = _entry(place)
+    owner, block = word(entry + 8 * OWNER), word(entry + 8 * BLOCK)
+    if owner == 0 or word(entry + 8 * INSTANCE) != instance:
+        return False
+    return word(owner + word(block + 8 * bk.PLUGIN_STATE)) + 8 * word(block + 8 * bk.STATE_ADDRESS) == state
+
+
+@jit
+def block_of_state(place, instance, state):
+    """Return the block of the instance whose numbers start at an address; place: what its slot says."""
+    if 1 <= place < CAPACITY and _keeps(place, instance, state):
+        return block_at(place)
+    for other in range(1, word(_table()) + 1):
+        if _keeps(other, instance, state):
+            return block_at(other)
+    return 0
