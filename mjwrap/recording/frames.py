@@ -1,5 +1,6 @@
 """Rows of a recording between two flushes: one of scalars a state, one of poses, paths and forces a displayed frame."""
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -35,7 +36,12 @@ class Beat:
     def __init__(self, rate: float | None) -> None:
         self._rate = rate
         self._start: float | None = None
-        self._next = -np.inf
+        self._next = -math.inf
+
+    @property
+    def next(self) -> float:
+        """The time [s] from which on a row is due."""
+        return self._next
 
     def due(self, time: float) -> bool:
         """Whether a row is due at a time [s]; always where there is no rate."""
@@ -48,8 +54,8 @@ class Beat:
         if self._start is None:
             self._start = time
         # whole multiples, so that rounding does not add up
-        count = np.floor((time - self._start) * self._rate + EARLY) + 1
-        self._next = float(self._start + (count - EARLY) / self._rate)
+        count = math.floor((time - self._start) * self._rate + EARLY) + 1
+        self._next = self._start + (count - EARLY) / self._rate
 
 
 class Buffers:
@@ -73,16 +79,19 @@ class Buffers:
         self._tables = _tables(scene)
         self._before = np.zeros(n)  # status of the last row that was taken
         self._rows = self._frames = 0
-        self._last_time = -np.inf
+        self._last_time = self._next_time = -math.inf
 
     @property
     def full(self) -> bool:
         """Whether the next row has no room."""
         return self._rows == len(self._time)
 
-    def add(self, data: Any) -> None:
-        """Copy what belongs to the muscles' last evaluation, where a row is due."""
+    def add(self, data: Any) -> bool:
+        """Copy what belongs to the muscles' last evaluation; return whether a row was due."""
         time = self._muscles.time
+        if self._last_time <= time < self._next_time:  # nearly every call
+            self._last_time = time
+            return False
         if not time >= self._last_time:
             raise RecordingError(
                 f"cannot log at time {time} s after {self._last_time} s: one recording is one run, in which time "
@@ -90,8 +99,6 @@ class Buffers:
             )
         self._last_time = time
         display = self._displays.due(time)
-        if not (display or self._states.due(time)):
-            return
         row = self._rows
         self._time[row] = time
         self._history.put_state(row)
@@ -100,6 +107,8 @@ class Buffers:
             self._add_frame(data, row)
             self._displays.take(time)
         self._rows = row + 1
+        self._next_time = min(self._displays.next, self._states.next)
+        return True
 
     def _add_frame(self, data: Any, row: int) -> None:
         poses, frame = self._muscles.poses(data), self._frames

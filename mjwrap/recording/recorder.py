@@ -93,10 +93,10 @@ class Recorder:
         """
         if self._ended:
             raise RecordingError(f"cannot log to '{self._place}': {self._ended}")
-        self._buffers.add(data)
-        if not self._laid_out:
+        added = self._buffers.add(data)
+        if added and not self._laid_out:
             self._guarded(self._lay_out)
-        if self._buffers.full or (self._live and time.perf_counter() >= self._batch_due):
+        if (added and self._buffers.full) or (self._live and time.perf_counter() >= self._batch_due):
             self._guarded(self._flush)
 
     def close(self) -> None:
