@@ -78,8 +78,8 @@ class Muscles:
     def poses(self, data: mujoco.MjData) -> mujoco.MjData:
         return data
 
-    def history(self, rows: int) -> "History":
-        return History(self)
+    def history(self, rows: int, muscles: np.ndarray, dofs: np.ndarray) -> "History":
+        return History(self, (muscles, dofs))
 
     def moment_arms(self, row: int, muscles: np.ndarray, dofs: np.ndarray) -> np.ndarray:
         """Of pairs of a muscle and a coordinate, (K,)."""
@@ -102,8 +102,9 @@ class Muscles:
 class History:
     """The same for `MuscleSystem.history`."""
 
-    def __init__(self, muscles: Muscles) -> None:
-        self._muscles = muscles
+    def __init__(self, muscles: Muscles, pairs: tuple[np.ndarray, np.ndarray]) -> None:
+        self._muscles, self._pairs = muscles, pairs
+        self._poses: list[tuple[np.ndarray, np.ndarray]] = []
         self._states: list[dict[str, np.ndarray]] = []
         self._frames: list[list[list[np.ndarray]]] = []  # frame, kind, muscle
         self._rows: list[int] = []
@@ -113,7 +114,8 @@ class History:
         self._states.append({name: getattr(self._muscles, name).copy() for name in MEASURED})
 
     def put_frame(self, frame: int, poses: mujoco.MjData, spacing: float | None) -> None:
-        del self._frames[frame:], self._rows[frame:]
+        del self._frames[frame:], self._rows[frame:], self._poses[frame:]
+        self._poses.append((poses.xpos.copy(), poses.xquat.copy()))
         muscles = self._muscles
         kinds = (muscles.points, lambda i: muscles.contact_points(i).reshape(-1, 3), muscles.arrows)
         self._frames.append([[kind(i) for i in range(muscles.n)] for kind in kinds])
@@ -127,19 +129,24 @@ class History:
         counts = np.array([[len(each) for each in muscle] for muscle in parts])
         return np.concatenate([each for muscle in parts for each in muscle]), counts
 
-    def polylines(self, frames: int) -> tuple[np.ndarray, np.ndarray]:
-        return self._ragged(0, frames)
+    def bodies(self, frames: int) -> tuple[np.ndarray, np.ndarray]:
+        positions, quaternions = zip(*self._poses[:frames], strict=True)
+        return np.array(positions), np.array(quaternions)
+
+    def polylines(self, frames: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        points, counts = self._ragged(0, frames)
+        return points, counts[counts > 0], (counts > 0).astype(np.int64)
 
     def contacts(self, frames: int) -> tuple[np.ndarray, np.ndarray]:
         return self._ragged(1, frames)
 
-    def arrows(self, frames: int, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    def arrows(self, frames: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arrows, counts = self._ragged(2, frames)
-        return arrows * np.array([1.0, scale])[:, np.newaxis], counts
+        return arrows[:, 0], scale * arrows[:, 1], counts
 
-    def moment_arms(self, frames: int, muscles: np.ndarray, dofs: np.ndarray) -> np.ndarray:
-        rows = [self._muscles.moment_arms(row, muscles, dofs) for row in self._rows[:frames]]
-        return np.array(rows).reshape(frames, len(muscles))
+    def moment_arms(self, frames: int) -> np.ndarray:
+        rows = [self._muscles.moment_arms(row, *self._pairs) for row in self._rows[:frames]]
+        return np.array(rows).reshape(frames, len(self._pairs[0]))
 
 
 def simulate(

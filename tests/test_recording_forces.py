@@ -11,6 +11,7 @@ import mjwrap as mw
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 
 from made_up_runs import ROOT, moving, read, static
+from test_force_laws import PULLEY
 
 from mjwrap import plugin
 from mjwrap.plugin import Muscles
@@ -48,6 +49,35 @@ def test_arrows_are_the_forces_on_bodies_and_cancel(model: mujoco.MjModel, tmp_p
             np.testing.assert_allclose(found, SCALE * np.array(expected), rtol=0, atol=3e-7 * size + 1e-12)
             np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=3e-6 * size + 1e-12)  # 32-bit
             np.testing.assert_array_equal(tails[[0, -1]], strip[[0, -1]])
+
+
+def test_a_pulley_parts_a_path_into_strips(tmp_path: Path) -> None:
+    """Each strip has its route's length, no line joins them, and their weighted sum is the muscle's length."""
+    model = mujoco.MjModel.from_xml_string(PULLEY)
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    sites = [data.site(name).xpos for name in "abbdcd"]
+    with mw.Recorder(model, muscles, tmp_path / "run.rrd", path_rate=1e4, spacing=2e-4) as record:
+        for _ in range(20):
+            muscles.step(data)
+            record.log(data)
+            mujoco.mj_kinematics(model, data)
+    strips = moving(read(tmp_path / "run.rrd")["/world/muscles/m/path"]["LineStrips3D:strips"])
+    assert len(strips) == 20
+    for _, found in strips:
+        assert len(found) == 3
+    muscles.forward(data)
+    history = muscles.history(2)
+    for frame in range(2):
+        history.put_frame(frame, muscles.poses(data), 2e-4)
+    points, sizes, counts = history.polylines(2)
+    assert counts.tolist() == [[3, 3]]
+    parts = np.split(points.astype(float), np.cumsum(sizes)[:-1])
+    for frame in (parts[:3], parts[3:]):
+        ends = [part[i] for part in frame for i in (0, -1)]
+        np.testing.assert_allclose(ends, sites, rtol=0, atol=1e-7)
+        lengths = [np.linalg.norm(np.diff(part, axis=0), axis=1).sum() for part in frame]
+        # chords of 0.2 mm over a radius of 3 cm are shorter by 2e-6 of their arc; 32-bit ends of some hundred of them
+        assert lengths @ np.array([1, 1 / 2, 1 / 3]) == pytest.approx(muscles.length[0], rel=1e-5)
 
 
 def test_moment_arms_are_what_a_joint_does_to_the_length(model: mujoco.MjModel, tmp_path: Path) -> None:
@@ -129,20 +159,17 @@ def test_several_instances_are_one_list_of_muscles() -> None:
     assert [name[2:] for name in muscles.names[:half]] == [name[2:] for name in muscles.names[half:]]
     # the second stands a metre aside, which costs a few roundings of 1 m
     np.testing.assert_allclose(muscles.length[half:], muscles.length[:half], rtol=0, atol=1e-14)
-    history = muscles.history(1)
+    every = np.arange(muscles.n)
+    history = muscles.history(1, np.tile(every, model.nv), np.repeat(np.arange(model.nv), muscles.n))
     history.put_state(0)
     history.put_frame(0, muscles.poses(data), None)
-    for drawn in (history.polylines(1), history.contacts(1)):
-        points, counts = drawn
-        first = int(counts[:half].sum())
-        np.testing.assert_array_equal(counts[:half], counts[half:])
+    tails, vectors, counts = history.arrows(1, SCALE)
+    for points, sizes in (history.polylines(1)[:2], history.contacts(1), (tails, counts)):
+        first = int(sizes[: len(sizes) // 2].sum())
+        np.testing.assert_array_equal(sizes[: len(sizes) // 2], sizes[len(sizes) // 2 :])
         np.testing.assert_allclose(points[first:] - [1, 0, 0], points[:first], rtol=0, atol=3e-7)  # 32-bit
-    arrows, _ = history.arrows(1, SCALE)
-    np.testing.assert_allclose(
-        arrows[len(arrows) // 2 :, 1], arrows[: len(arrows) // 2, 1], rtol=0, atol=1e-12
-    )
-    every = np.arange(muscles.n)
-    arms = [history.moment_arms(1, every, np.full(muscles.n, dof))[0] for dof in range(model.nv)]
+    np.testing.assert_allclose(vectors[len(vectors) // 2 :], vectors[: len(vectors) // 2], rtol=0, atol=1e-12)
+    arms = history.moment_arms(1)[0].reshape(model.nv, muscles.n)
     np.testing.assert_allclose(arms[0][:half], arms[1][half:], rtol=0, atol=1e-13)
     assert not arms[0][half:].any()
     assert not arms[1][:half].any()
@@ -180,8 +207,9 @@ def test_forces_of_muscles_that_mujoco_pulls_are_its_own() -> None:
         np.testing.assert_array_equal(getattr(muscles, name), getattr(plugin.read(data), name))
     history.put_state(0)
     history.put_frame(0, muscles.poses(data), None)
-    arrows, counts = history.arrows(1, 1.0)
+    _, vectors, counts = history.arrows(1, 1.0)
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    np.testing.assert_allclose(np.linalg.norm(arrows[first, 1], axis=1), muscles.tension, rtol=1e-12)
+    norms = np.linalg.norm(vectors[first].astype(float), axis=1)
+    np.testing.assert_allclose(norms, muscles.tension, rtol=3e-7)  # 32-bit
     assert muscles.tension.min() > 1.0
     assert muscles.time == data.time - model.opt.timestep

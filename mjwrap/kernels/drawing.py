@@ -1,13 +1,12 @@
-"""Polylines, contact points and forces of all muscles in one call each, for pictures and recordings."""
+"""Polylines and contact points of all muscles in one call each, for pictures and recordings."""
 
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.coupling import R_HI, R_LO, R_MUSCLE
-from mjwrap.kernels.moments import length_jacobian
 from mjwrap.kernels.polyline import polyline
-from mjwrap.kernels.segments import G_A, G_B, G_E, G_FAR
+from mjwrap.kernels.segments import G_A, G_B, G_FAR
 
 
 @inlined
@@ -84,98 +83,3 @@ def contacts(routes, node, seg, seg_count, only, out, starts):
         muscle += 1
         starts[muscle] = count
     return count
-
-
-# ---------------------------------------------- many frames: seg (T, N + C, SEGMENT), seg_count (T, C), tension (T, n)
-
-
-@jit
-def contacts_over(routes, node, seg, seg_count, out, counts):
-    """Do `contacts` for T frames, all of a muscle one after the other; counts (n, T); return how many rows.
-
-    node: of any frame; only the kinds of the obstacles are read.
-    """
-    total = 0
-    c = 0
-    for m in range(counts.shape[0]):
-        first = c
-        while c < routes.shape[0] and routes[c, R_MUSCLE] == m:
-            c += 1
-        for t in range(seg.shape[0]):
-            before = total
-            for r in range(first, c):
-                total = route_contacts(r, routes, node, seg[t], seg_count[t], out, total)
-            counts[m, t] = total - before
-    return total
-
-
-@inlined
-def _arrow(out, count, x, y, z, vx, vy, vz):
-    """Append an arrow where there is room: tail, then vector; return the new count."""
-    if count < out.shape[0]:
-        out[count, 0], out[count, 1], out[count, 2] = x, y, z
-        out[count, 3], out[count, 4], out[count, 5] = vx, vy, vz
-    return count + 1
-
-
-@jit
-def _route_arrows(c, routes, seg, seg_count, size, out, count):
-    """Append the forces of route c as arrows, `size` times the unit vectors of its segments; return the new count."""
-    if seg_count[c] == 0:
-        return count
-    first = routes[c, R_LO] + c
-    last = first + seg_count[c] - 1
-    count = _arrow(
-        out, count, seg[first, G_A], seg[first, G_A + 1], seg[first, G_A + 2],
-        size * seg[first, G_E], size * seg[first, G_E + 1], size * seg[first, G_E + 2],
-    )  # fmt: skip
-    for j in range(first, last):
-        k = j + 1
-        vx = size * (seg[k, G_E] - seg[j, G_E])
-        vy = size * (seg[k, G_E + 1] - seg[j, G_E + 1])
-        vz = size * (seg[k, G_E + 2] - seg[j, G_E + 2])
-        x = 0.5 * (seg[j, G_B] + seg[k, G_A])
-        y = 0.5 * (seg[j, G_B + 1] + seg[k, G_A + 1])
-        z = 0.5 * (seg[j, G_B + 2] + seg[k, G_A + 2])
-        count = _arrow(out, count, x - vx, y - vy, z - vz, vx, vy, vz)
-    return _arrow(
-        out, count, seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2],
-        -size * seg[last, G_E], -size * seg[last, G_E + 1], -size * seg[last, G_E + 2],
-    )  # fmt: skip
-
-
-@jit
-def arrows_over(routes, weights, seg, seg_count, tension, scale, out, counts):
-    """Write the forces on bodies as arrows (tail [m], vector [scale N]) to out (m, 6), counts (n, T); return m.
-
-    A route pulls at its origin and insertion, where the arrows' tails are. A surface or via point between them is
-    pressed by the sum of the pulls at both ends of the contact: an arrow whose tip is midway between them.
-    """
-    total = 0
-    c = 0
-    for m in range(counts.shape[0]):
-        first = c
-        while c < routes.shape[0] and routes[c, R_MUSCLE] == m:
-            c += 1
-        for t in range(seg.shape[0]):
-            before = total
-            for r in range(first, c):
-                size = scale * weights[r] * tension[t, m]
-                total = _route_arrows(r, routes, seg[t], seg_count[t], size, out, total)
-            counts[m, t] = total - before
-    return total
-
-
-@jit
-def moment_arms_over(
-    routes, weights, links, seg, seg_count, last_dof, dof_parentid, body_rootid, cdof, subtree_com, muscles, columns,
-    jacobian, out,
-):  # fmt: skip
-    """Write -dl/dq of the pairs (muscles, columns), (K,) each, in T frames to out (T, K); jacobian (n, nv): scratch."""
-    for t in range(seg.shape[0]):
-        length_jacobian(
-            routes, weights, links, seg[t], seg_count[t], last_dof, dof_parentid, body_rootid, cdof[t], subtree_com[t],
-            jacobian,
-        )  # fmt: skip
-        for k in range(muscles.shape[0]):
-            out[t, k] = -jacobian[muscles[k], columns[k]]

@@ -1,6 +1,7 @@
 """Columns of a recording: NumPy rows gathered during the run, turned into Arrow columns a few hundred at once."""
 
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,18 +20,22 @@ _QUAT = rr.components.RotationQuatBatch._ARROW_DATATYPE
 
 _BLUE = np.array([40.0, 80.0, 230.0])
 _RED = np.array([230.0, 30.0, 30.0])
+_SHADES = 4096  # of the colours between them, far finer than the eight bits of a channel
 
 Array = npt.NDArray[Any]
-Ragged = tuple[
-    Array, Array
-]  # rows of all muscles, one muscle after the other, and how many each has a frame (n, T)
 
 
 def activation_colors(activation: npt.ArrayLike) -> npt.NDArray[np.uint32]:
     """Colours 0xRRGGBBAA of activations (n,): blue at 0, red at 1, straight between, clipped outside."""
-    share = np.clip(np.asarray(activation, dtype=np.float64), 0.0, 1.0)[..., np.newaxis]
-    rgb = np.rint(_BLUE + share * (_RED - _BLUE)).astype(np.uint32)
-    return (rgb[..., 0] << 24 | rgb[..., 1] << 16 | rgb[..., 2] << 8 | 0xFF).astype(np.uint32)
+    share = np.clip(np.asarray(activation, dtype=np.float64), 0.0, 1.0)
+    return _palette()[np.rint(share * _SHADES).astype(np.intp)]
+
+
+@cache
+def _palette() -> npt.NDArray[np.uint32]:
+    share = np.linspace(0.0, 1.0, _SHADES + 1)[:, np.newaxis]
+    red, green, blue = np.rint(_BLUE + share * (_RED - _BLUE)).astype(np.uint32).T
+    return red << 24 | green << 16 | blue << 8 | 0xFF
 
 
 class Table:
@@ -131,22 +136,25 @@ def path_table(paths: Sequence[str], contacts: Sequence[str], forces: Sequence[s
 
 
 def path_columns(
-    paths: "Ragged", contacts: "Ragged", arrows: "Ragged", colors: npt.NDArray[np.uint32]
+    paths: tuple[Array, Array, Array],
+    contacts: tuple[Array, Array],
+    arrows: tuple[Array, Array, Array],
+    colors: Array,
 ) -> list[pa.Array]:
-    """Polylines, contact points and arrows of n muscles over T frames, colours (T, n), as 5 n columns of T rows.
+    """Polylines, contact points and arrows of n muscles over T frames, as `History` returns them; colours (T, n).
 
-    A muscle that has no path in a frame, because none was found yet, has an empty row there.
+    5 n columns of T rows. A muscle that has no path in a frame, because none was found yet, has an empty row there.
     """
     frames, n = colors.shape
-    (points, counts), (touches, numbers), (forces, shafts) = paths, contacts, arrows
-    drawn = counts.ravel() > 0
-    strips = pa.ListArray.from_arrays(_offsets(counts.ravel()[drawn]), _fixed(points, _VEC3), type=_STRIP)
+    (points, sizes, strips), (touches, numbers), (tails, vectors, shafts) = paths, contacts, arrows
+    force = _offsets(shafts.ravel())
+    lines = pa.ListArray.from_arrays(_offsets(sizes), _fixed(points, _VEC3), type=_STRIP)
     whole = (
-        pa.ListArray.from_arrays(_offsets(drawn), strips),
+        pa.ListArray.from_arrays(_offsets(strips.ravel()), lines),
         pa.ListArray.from_arrays(_one_each(n * frames), pa.array(np.ascontiguousarray(colors.T).ravel())),
         pa.ListArray.from_arrays(_offsets(numbers.ravel()), _fixed(touches, _VEC3)),
-        pa.ListArray.from_arrays(_offsets(shafts.ravel()), _fixed(forces[:, 0], _VEC3)),
-        pa.ListArray.from_arrays(_offsets(shafts.ravel()), _fixed(forces[:, 1], _VECTOR)),
+        pa.ListArray.from_arrays(force, _fixed(tails, _VEC3)),
+        pa.ListArray.from_arrays(force, _fixed(vectors, _VECTOR)),
     )
     return [array.slice(i * frames, frames) for i in range(n) for array in whole]
 

@@ -64,20 +64,17 @@ class Buffers:
     def __init__(self, scene: Scene, muscles: "Results", rows: int, options: Options) -> None:
         self._scene, self._muscles, self._options = scene, muscles, options
         self._states, self._displays = Beat(options.rate), Beat(options.path_rate)
-        n, bodies = len(scene.muscle_names), scene.model.nbody
         self._time = np.empty(rows)
         self._frame_rows = np.empty(rows, dtype=np.int64)  # the row that each frame belongs to
-        self._positions = np.empty((rows, bodies, 3), dtype=np.float32)
-        self._quaternions = np.empty((rows, bodies, 4), dtype=np.float32)
-        self._history = muscles.history(rows)
         self._widths = [len(coordinate.muscles) for coordinate in scene.coordinates]
-        self._crossing = (
+        self._history = muscles.history(
+            rows,
             np.array([i for coordinate in scene.coordinates for i in coordinate.muscles], dtype=np.int64),
             np.repeat([coordinate.dof for coordinate in scene.coordinates], self._widths).astype(np.int64),
         )
         self._force_scale = options.force_scale
         self._tables = _tables(scene)
-        self._before = np.zeros(n)  # status of the last row that was taken
+        self._before = np.zeros(len(scene.muscle_names))  # status of the last row that was taken
         self._rows = self._frames = 0
         self._last_time = self._next_time = -math.inf
 
@@ -111,22 +108,21 @@ class Buffers:
         return True
 
     def _add_frame(self, data: Any, row: int) -> None:
-        poses, frame = self._muscles.poses(data), self._frames
-        self._positions[frame] = poses.xpos
-        self._quaternions[frame] = poses.xquat
+        frame = self._frames
         self._frame_rows[frame] = row
-        self._history.put_frame(frame, poses, self._options.spacing)
+        self._history.put_frame(frame, self._muscles.poses(data), self._options.spacing)
         self._frames = frame + 1
 
     def lay_out(self, stream: Stream) -> None:
         """Log what waits for the first frame: the layout, which looks at the muscles, and the welded bodies."""
         if self._frames:
-            arms = np.abs(self._history.moment_arms(1, *self._crossing)[0])
+            arms = np.abs(self._history.moment_arms(1)[0])
             parts = np.split(arms, np.cumsum(self._widths)[:-1]) if self._widths else []
-            first = First(self._history.polylines(1)[0], self._positions[0], parts)
+            positions, quaternions = (array[0] for array in self._history.bodies(1))
+            first = First(self._history.polylines(1)[0], positions, parts)
             if self._force_scale is None:
                 self._force_scale = ARROW * first.size / self._scene.strength
-            self._scene.log_welded(stream, self._positions[0], self._quaternions[0])
+            self._scene.log_welded(stream, positions, quaternions)
         else:
             first = First(np.empty((0, 3)), np.empty((0, 3)), [])
         stream.blueprint(blueprint(self._scene, first))
@@ -177,10 +173,10 @@ class Buffers:
         times = self._time[rows]
         batches = []
         if moving:
-            poses = self._positions[: self._frames, moving], self._quaternions[: self._frames, moving]
+            poses = (array[:, moving] for array in self._history.bodies(self._frames))
             batches.append(self._tables["poses"].batch(times, columns.pose_columns(*poses)))
         if self._widths:
-            arms = self._history.moment_arms(self._frames, *self._crossing)
+            arms = self._history.moment_arms(self._frames)
             batches.append(
                 self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths))
             )
@@ -191,7 +187,8 @@ class Buffers:
             history.contacts(frames),
             history.arrows(frames, self._force_scale or 1.0),
         )
-        batches.append(self._tables["paths"].batch(times, columns.path_columns(*drawn, colors)))
+        cells = columns.path_columns(*drawn, colors)
+        batches.append(self._tables["paths"].batch(times, cells))
         return batches
 
 

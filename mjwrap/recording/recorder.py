@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mjwrap.system.results import Results
 
 SUFFIX = ".rrd"
-BUFFERED = 40_000  # states of a muscle that are gathered unless the caller says otherwise; some 50 MB
+BUFFERED = 80_000  # states of a muscle that are gathered unless the caller says otherwise; some 50 MB
 LIVE = 0.2  # seconds by the clock between two batches to a running viewer
 
 
@@ -36,7 +36,7 @@ class Recorder:
     Bodies, paths, contact points, forces and moment arms are taken `path_rate` times [Hz]. `groups` says whose curves
     stand together, {name: patterns of muscle names} (None: by the body that they move). `force_scale` [m/N] is the
     length of an arrow (None: the strongest muscle's is three tenths of the size of all paths). `flush_every` states are
-    gathered before they go to the file (None: 2000, fewer where there are many muscles); `spacing` [m] is the distance
+    gathered before they go to the file (None: 4000, fewer where there are many muscles); `spacing` [m] is the distance
     of points on the curved parts of a path (None: as many as their curvature asks for).
 
     The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
@@ -79,7 +79,7 @@ class Recorder:
             raise
         from mjwrap.recording.frames import Buffers, Options
 
-        rows = flush_every or int(np.clip(BUFFERED // max(1, muscles.n), 250, 2000))
+        rows = flush_every or int(np.clip(BUFFERED // max(1, muscles.n), 250, 4000))
         self._buffers = Buffers(scene, muscles, rows, Options(rate, path_rate, spacing, force_scale))
         self._place = str(connect if self._target is None else self._target.path)
         self._laid_out = False

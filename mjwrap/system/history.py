@@ -1,4 +1,4 @@
-"""What the muscles of a model were at many times: gathered raw, which costs little, and worked out together."""
+"""What the muscles of a model were at many times: kept as it was at each, and put in order by muscle together."""
 
 from __future__ import annotations
 
@@ -8,45 +8,67 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels import coupling, drawing, layout, segments
+from mjwrap.kernels import coupling, footage, layout
 from mjwrap.system.state import NUMBERS
 
 if TYPE_CHECKING:
     from mjwrap.system.results import Results
 
 Array = NDArray[np.float64]
+Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
+
+
+class Store:
+    """Rows of numbers, frame after frame, each frame's in parts; it grows."""
+
+    def __init__(self, frames: int, parts: int, width: int) -> None:
+        self.rows = np.empty((0, width), dtype=np.float32)
+        self.starts = np.zeros((frames, parts + 1), dtype=np.int64)  # where each part of a frame begins
+
+    def make_room(self, frame: int) -> None:
+        """Grow where a frame did not fit: the first one, and one with more to draw later."""
+        begin, end = int(self.starts[frame, 0]), int(self.starts[frame, -1])
+        if end > len(self.rows):
+            count = 2 * len(self.rows) + (end - begin) * len(self.starts)
+            rows = np.empty((count, self.rows.shape[1]), dtype=np.float32)
+            rows[:begin] = self.rows[:begin]
+            self.rows = rows
+
+    def room(self, frames: int) -> Singles:
+        """Return room for the points of the first frames in another order."""
+        return np.empty((int(self.starts[frames - 1, -1]) if frames else 0, 3), dtype=np.float32)
 
 
 class History:
     """Room for `rows` states, and as many frames, of the muscles whose results are given.
 
-    A state is what every muscle has, a frame what is needed to draw it: paths, forces and bodies. Time goes along the
-    first axis of all that is read.
+    A state is what every muscle has, a frame what is drawn: poses of the bodies, paths, contact points, forces, and
+    moment arms of the pairs of a muscle and a coordinate that `muscles` and `dofs` (K,) name. Time goes along the first
+    axis of what is read as numbers. Points are in 32 bits.
     """
 
-    def __init__(self, results: Results, rows: int) -> None:
+    def __init__(
+        self, results: Results, rows: int, muscles: Ints | None = None, dofs: Ints | None = None
+    ) -> None:
         self._results = results
         plan, model = results._plan, results.model
         n, routes = plan.n, len(plan.routes)
         self._numbers = np.zeros((rows, len(NUMBERS), n))
         self._status = np.zeros((rows, n), dtype=np.int64)
         self._iterations = np.zeros((rows, routes))
-        self._segments = np.zeros((rows, len(plan.node) + routes, segments.SEGMENT))
-        self._counts = np.zeros((rows, routes), dtype=np.int64)
-        self._tension = np.zeros((rows, n))
-        self._cdof = np.zeros((rows, model.nv, 6))
-        self._subtree_com = np.zeros((rows, model.nbody, 3))
-        # points of all paths, muscle after muscle, frame after frame, and those of one frame; both grow
-        self._points, self._frame = np.empty((rows, 3), dtype=np.float32), np.zeros((1, 3))
-        self._starts = np.zeros(
-            (rows, n + 1), dtype=np.int64
-        )  # where each muscle's points begin within its frame
-        self._begins = np.zeros(rows + 1, dtype=np.int64)  # where each frame's points begin
-        # room for what is drawn at most: two contact points a node, an arrow a node and two a route
-        self._contacts = np.zeros((2 * rows * len(plan.node), 3))
-        self._arrows = np.zeros((rows * (len(plan.node) + 2 * routes), 6))
-        for array in (self._numbers, self._segments, self._contacts, self._arrows):
+        none = np.empty(0, dtype=np.int64)
+        self._pairs = (none, none) if muscles is None or dofs is None else (muscles, dofs)
+        self._arms = np.zeros((rows, len(self._pairs[0])))
+        self._jacobian = np.zeros((n, model.nv))
+        self._positions = np.zeros((rows, model.nbody, 3), dtype=np.float32)
+        self._quaternions = np.zeros((rows, model.nbody, 4), dtype=np.float32)
+        self._points, self._contacts, self._forces = (
+            Store(rows, routes, 3), Store(rows, n, 3), Store(rows, n, footage.FORCE)
+        )  # fmt: skip
+        self._plan = plan.routes, plan.weights, plan.links
+        self._tree = results._last_dof, results._dofs[2], results._root
+        for array in (self._numbers, self._arms, self._positions, self._quaternions):
             array.fill(0.0)  # has the system find the memory now, and not in the course of a run
 
     def put_state(self, row: int) -> None:
@@ -57,30 +79,20 @@ class History:
         self._iterations[row] = last.info[:, layout.I_ITERATIONS]
 
     def put_frame(self, frame: int, poses: mujoco.MjData, spacing: float | None) -> None:
-        """Keep the last evaluation's paths and forces; poses: the data whose kinematics it saw, as `poses` returns.
+        """Keep the last evaluation's paths and forces; poses: the data whose poses it saw (`Results.poses`).
 
         spacing [m]: as for `Results.polylines`. Frames are put in order.
         """
         last = self._results._evaluation()
-        self._segments[frame] = last.segments
-        self._counts[frame] = last.count
-        self._tension[frame] = last.tension
-        self._cdof[frame] = poses.cdof
-        self._subtree_com[frame] = poses.subtree_com
-        plan, begin, starts = self._results._plan, int(self._begins[frame]), self._starts[frame]
-        given = (plan.routes, last.node, last.segments, last.count, last.info, spacing or 0.0, -1)
-        count = drawing.polylines(*given, self._frame, starts)
-        if count > len(self._frame):
-            self._frame = np.zeros((2 * count, 3))
-            drawing.polylines(*given, self._frame, starts)
-        if begin + count > len(
-            self._points
-        ):  # at the first frame, and where the paths have more points later
-            points = np.empty((2 * len(self._points) + count * len(self._starts), 3), dtype=np.float32)
-            points[:begin] = self._points[:begin]
-            self._points = points
-        self._points[begin : begin + count] = self._frame[:count]
-        self._begins[frame + 1] = begin + count
+        points, contacts, forces = self._points, self._contacts, self._forces
+        while not footage.put_frame(
+            *self._plan, last.node, last.segments, last.count, last.info, last.tension, spacing or 0.0, *self._tree,
+            poses.cdof, poses.subtree_com, poses.xpos, poses.xquat, *self._pairs, self._jacobian, frame,
+            points.rows, points.starts, contacts.rows, contacts.starts, forces.rows, forces.starts, self._arms,
+            self._positions, self._quaternions,
+        ):  # fmt: skip
+            for store in (points, contacts, forces):
+                store.make_room(frame)
 
     def states(self, rows: int) -> dict[str, Array]:
         """Return what the first `rows` states were, (rows, n) each, by the names that `Results` has for them."""
@@ -95,44 +107,43 @@ class History:
             found["iterations"] = self._iterations[:rows]
         return found
 
-    def polylines(self, frames: int) -> tuple[NDArray[np.float32], Ints]:
-        """Return the paths of the first `frames` frames, muscle after muscle: points (m, 3) [m], counts (n, frames)."""
-        starts, begins = self._starts[:frames], self._begins[:frames]
-        counts = np.diff(starts, axis=1).T
-        first = (starts[:, :-1] + begins[:, np.newaxis]).T.ravel()  # of a muscle in a frame
-        ends = np.cumsum(counts)
-        order = np.arange(counts.sum()) + np.repeat(first - ends + counts.ravel(), counts.ravel())
-        return self._points.take(order, axis=0), counts
+    def bodies(self, frames: int) -> tuple[Singles, Singles]:
+        """Return positions (frames, nbody, 3) [m] and quaternions (frames, nbody, 4) w-x-y-z of the bodies."""
+        return self._positions[:frames], self._quaternions[:frames]
 
-    def contacts(self, frames: int) -> tuple[Array, Ints]:
-        """Return the contact points, P and Q in turn, as `polylines` does the paths; valid until the next call."""
-        plan, last = self._results._plan, self._results._evaluation()
-        counts = np.empty((plan.n, frames), dtype=np.int64)
-        given = (plan.routes, last.node, self._segments[:frames], self._counts[:frames])
-        return self._contacts[: drawing.contacts_over(*given, self._contacts, counts)], counts
+    def polylines(self, frames: int) -> tuple[Singles, Ints, Ints]:
+        """Return the paths of the first frames: points (m, 3) [m], sizes (S,) and counts (n, frames) of strips.
 
-    def arrows(self, frames: int, scale: float) -> tuple[Array, Ints]:
-        """Return the forces on bodies as arrows (m, 2, 3), as `polylines` does the paths; valid until the next call.
-
-        An arrow is its tail [m] and its vector, `scale` [m/N] times the force, world frame. Pulls start at the origin
-        and at the insertion; what presses a surface or a via point, the sum over the contact, ends midway between the
-        contact points.
+        A pulley parts a muscle's path into several strips. They come by muscle, then by frame; sizes says how many
+        points each has, counts how many strips a muscle has in a frame: none where no path was found yet.
         """
-        plan = self._results._plan
-        counts = np.empty((plan.n, frames), dtype=np.int64)
-        count = drawing.arrows_over(
-            plan.routes, plan.weights, self._segments[:frames], self._counts[:frames], self._tension[:frames],
-            float(scale), self._arrows, counts,
-        )  # fmt: skip
-        return self._arrows[:count].reshape(-1, 2, 3), counts
+        store, routes = self._points, self._plan[0]
+        out, counts = store.room(frames), self._counts(frames)
+        sizes = np.empty(len(routes) * frames, dtype=np.int64)
+        count = footage.gather_strips(store.rows, store.starts, routes, out, sizes, counts)
+        return out, sizes[:count], counts
 
-    def moment_arms(self, frames: int, muscles: Ints, dofs: Ints) -> Array:
-        """Return −∂l/∂q (frames, K) of K pairs of a muscle and a coordinate, (K,) each [m], or 1 about a slide."""
-        results, plan = self._results, self._results._plan
-        out = np.empty((frames, len(muscles)))
-        drawing.moment_arms_over(
-            plan.routes, plan.weights, plan.links, self._segments[:frames], self._counts[:frames], results._last_dof,
-            results._dofs[2], results._root, self._cdof[:frames], self._subtree_com[:frames], muscles, dofs,
-            np.empty((plan.n, results.model.nv)), out,
-        )  # fmt: skip
-        return out
+    def contacts(self, frames: int) -> tuple[Singles, Ints]:
+        """Return the contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
+        store = self._contacts
+        out, counts = store.room(frames), self._counts(frames)
+        footage.gather(store.rows, store.starts, out, counts)
+        return out, counts
+
+    def arrows(self, frames: int, scale: float) -> tuple[Singles, Singles, Ints]:
+        """Return the forces on bodies as arrows, by muscle, then frame: tails, vectors (m, 3) [m], counts (n, frames).
+
+        A vector is `scale` [m/N] times the force, world frame. Pulls start at the origin and at the insertion; what
+        presses a surface or a via point, the sum over the contact, ends midway between the contact points.
+        """
+        store = self._forces
+        tails, vectors, counts = store.room(frames), store.room(frames), self._counts(frames)
+        footage.gather_arrows(store.rows, store.starts, float(scale), tails, vectors, counts)
+        return tails, vectors, counts
+
+    def _counts(self, frames: int) -> Ints:
+        return np.empty((self._results.n, frames), dtype=np.int64)
+
+    def moment_arms(self, frames: int) -> Array:
+        """Return −∂l/∂q (frames, K) of the pairs [m], or 1 about a slide."""
+        return self._arms[:frames]

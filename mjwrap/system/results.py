@@ -174,9 +174,11 @@ class Results:
         """Return the data whose kinematics the results belong to: `data` itself."""
         return data
 
-    def history(self, rows: int) -> History:
-        """Return room for `rows` states and frames of the muscles, which may be read together later."""
-        return History(self, rows)
+    def history(
+        self, rows: int, muscles: NDArray[np.int64] | None = None, dofs: NDArray[np.int64] | None = None
+    ) -> History:
+        """Return room for `rows` states and frames of the muscles, with the moment arms of pairs (muscles, dofs)."""
+        return History(self, rows, muscles, dofs)
 
     def forces(self, i: int) -> list[tuple[int, Array, Array]]:
         """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""
