@@ -51,6 +51,24 @@ def test_arrows_are_the_forces_on_bodies_and_cancel(model: mujoco.MjModel, tmp_p
             np.testing.assert_array_equal(tails[[0, -1]], strip[[0, -1]])
 
 
+def test_joints_are_where_the_data_says_at_its_own_time(model: mujoco.MjModel, tmp_path: Path) -> None:
+    """After a step the data is one step further than the results."""
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    seen = []
+    with mw.Recorder(model, muscles, tmp_path / "run.rrd", path_rate=1e4) as record:
+        for _ in range(STEPS):
+            data.ctrl[:] = 0.4
+            muscles.step(data)
+            record.log(data)
+            seen.append((data.time, *data.qpos))
+    content = read(tmp_path / "run.rrd")
+    assert model.nq == 1
+    curve = moving(content[f"/joint/{model.joint(0).name}"]["Scalars:scalars"])
+    times = np.array([nanoseconds for nanoseconds, _ in curve], dtype=float)
+    np.testing.assert_allclose(1e-9 * times, [time for time, _ in seen], rtol=0, atol=1e-9)
+    assert [angle for _, (angle,) in curve] == [angle for _, angle in seen]
+
+
 def test_a_pulley_parts_a_path_into_strips(tmp_path: Path) -> None:
     """Each strip has its route's length, no line joins them, and their weighted sum is the muscle's length."""
     model = mujoco.MjModel.from_xml_string(PULLEY)

@@ -66,6 +66,9 @@ class Buffers:
         self._states, self._displays = Beat(options.rate), Beat(options.path_rate)
         self._time = np.empty(rows)
         self._frame_rows = np.empty(rows, dtype=np.int64)  # the row that each frame belongs to
+        self._qpos = np.zeros((rows, scene.model.nq))
+        self._qpos_time = np.zeros(rows)
+        self._joints = [scene.coordinates[k].qpos for k in scene.joints]
         self._widths = [len(coordinate.muscles) for coordinate in scene.coordinates]
         self._history = muscles.history(
             rows,
@@ -111,6 +114,8 @@ class Buffers:
         frame = self._frames
         self._frame_rows[frame] = row
         self._history.put_frame(frame, self._muscles.poses(data), self._options.spacing)
+        self._qpos[frame] = data.qpos
+        self._qpos_time[frame] = data.time  # after a step it is the next one's, the results are of this one
         self._frames = frame + 1
 
     def lay_out(self, stream: Stream) -> None:
@@ -175,6 +180,9 @@ class Buffers:
         if moving:
             poses = (array[:, moving] for array in self._history.bodies(self._frames))
             batches.append(self._tables["poses"].batch(times, columns.pose_columns(*poses)))
+        if self._joints:
+            cells = columns.scalar_columns(self._qpos[: self._frames, self._joints])
+            batches.append(self._tables["joints"].batch(self._qpos_time[: self._frames], cells))
         if self._widths:
             arms = self._history.moment_arms(self._frames)
             batches.append(
@@ -198,6 +206,7 @@ def _tables(scene: Scene) -> dict[str, columns.Table]:
         "scalars": columns.scalar_table(scalars),
         "log": columns.text_table(LOG),
         "poses": columns.pose_table([scene.bodies[body] for body in scene.moving]),
+        "joints": columns.scalar_table(list(scene.joints.values())),
         "moment_arms": columns.scalar_table(scene.moment_arms),
         "paths": columns.path_table(scene.paths, scene.contacts, scene.forces),
     }

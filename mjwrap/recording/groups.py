@@ -33,7 +33,8 @@ class Group:
 class Coordinate:
     """A joint, or one axis of it, and the muscles that cross it.
 
-    turns: whether it is an angle; follows: whether an equality moves it with another joint.
+    turns: whether it is an angle; follows: whether an equality moves it with another joint; qpos: where its value is,
+    -1 for an axis of a ball or free joint, which has none.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Coordinate:
     muscles: list[int]
     turns: bool
     follows: bool
+    qpos: int
 
 
 def given_groups(wanted: Mapping[str, str | Iterable[str]], muscles: Sequence[str]) -> list[Group]:
@@ -132,5 +134,6 @@ def crossed_coordinates(
         name = f"{joint_names[joint]} {_AXES[kind][axis]}" if kind in _AXES else joint_names[joint]
         turns = kind in (HINGE, BALL) or (kind == FREE and axis > 2)
         muscles = [int(i) for i in np.flatnonzero(crossing[:, dof])]
-        found.append(Coordinate(name, int(dof), muscles, turns, joint in followers))
+        qpos = -1 if kind in _AXES else int(model.jnt_qposadr[joint])
+        found.append(Coordinate(name, int(dof), muscles, turns, joint in followers, qpos))
     return found

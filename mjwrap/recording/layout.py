@@ -28,6 +28,7 @@ GROUP_TITLES = {
     "power": "sum of powers [W]",
     "without_path": "muscles without a path",
 }
+LEGEND = 16  # joints whose names fit beside their curves
 SIDE = 6  # joints whose moment arms are shown together
 MANY = 100  # muscles from which on their forces hide more than they show
 SCENERY = 2.0  # a mesh of the world so many times larger than all muscles is a backdrop
@@ -76,6 +77,8 @@ def _curves(scene: Scene, first: First) -> rrb.Container | None:
     if len(tabs) > 1:
         tabs.insert(0, _overview(scene))
     if len(scene.coordinates) > 1:
+        tabs.append(_moment_arms(scene))
+    if len(scene.joints) > 1:
         tabs.append(_joints(scene))
     if not tabs:
         return None
@@ -143,10 +146,12 @@ def _main_joint(scene: Scene, page: list[int], first: First) -> list[rrb.View]:
         plot_legend=rrb.PlotLegend("LeftTop", visible=False),
         overrides={path: rr.SeriesLines.from_fields(visible_series=shown)},
     )
-    return [view]
+    if best not in scene.joints:
+        return [view]
+    return [view, _plot([scene.joints[best]], f"angle of {coordinate.name} [rad]")]
 
 
-def _joints(scene: Scene) -> rrb.Container:
+def _moment_arms(scene: Scene) -> rrb.Container:
     """Moment arms about every coordinate that is free to move, `SIDE` to a page."""
     free = [k for k, coordinate in enumerate(scene.coordinates) if not coordinate.follows]
     free = free or list(range(len(scene.coordinates)))
@@ -166,6 +171,16 @@ def _joints(scene: Scene) -> rrb.Container:
         return rrb.Tabs(contents=pages, active_tab=0, name="moment arms")
     pages[0].name = "moment arms"
     return pages[0]
+
+
+def _joints(scene: Scene) -> rrb.Container:
+    """Where the joints are, angles apart from lengths."""
+    views = []
+    for turns, title in ((True, "joint angles [rad]"), (False, "positions of slides [m]")):
+        shown = [path for k, path in scene.joints.items() if scene.coordinates[k].turns is turns]
+        if shown:
+            views.append(_plot(shown, title, legend=len(shown) <= LEGEND))
+    return rrb.Vertical(contents=views, name="joints")
 
 
 def _solver(scene: Scene) -> rrb.Container:

@@ -53,6 +53,7 @@ class Scene:
         joint_names = _distinct([model.joint(i).name for i in range(model.njnt)], "joint")
         self.coordinates = crossed_coordinates(model, self.declarations, joint_names)
         self.moment_arms = [entity("moment_arm", coordinate.name) for coordinate in self.coordinates]
+        self.joints = {k: entity("joint", c.name) for k, c in enumerate(self.coordinates) if c.qpos >= 0}
         self.groups = self._grouped(body_names, groups)
         self.group_series = {q: [entity("groups", q, group.name) for group in self.groups] for q in SUMMED}
         self.group_sizes = np.array([len(group.members) for group in self.groups], dtype=np.int64)
@@ -132,6 +133,9 @@ class Scene:
         for path, coordinate in zip(self.moment_arms, self.coordinates, strict=True):
             names = [self.muscle_names[i] for i in coordinate.muscles]
             stream.static(path, _curves(names, self.colors[coordinate.muscles]))
+        for place, (k, path) in enumerate(self.joints.items()):
+            color = SERIES_COLORS[[place % len(SERIES_COLORS)]]
+            stream.static(path, _curves([self.coordinates[k].name], color))
 
     def log_welded(self, stream: Stream, positions: np.ndarray, quaternions: np.ndarray) -> None:
         """Log the poses (nbody, 3), (nbody, 4) w-x-y-z of bodies that are fixed in the world."""
