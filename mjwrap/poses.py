@@ -23,7 +23,8 @@ class Motion:
 
     name: a joint's, or "random poses"; at (T,): the joint's position [m or rad], or a running number; qpos (T, nq);
     tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether one pose leads to the next;
-    base: the number of the pose around which a joint is swept.
+    base: the number of the pose around which a joint is swept; alone: whether that joint is coupled to another one,
+    so that no motion leads there.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Motion:
     qvel: Array
     continuous: bool
     base: int = 0
+    alone: bool = False
 
 
 class Coupling(NamedTuple):
@@ -66,6 +68,10 @@ class PoseMaker:
     def joints(self) -> list[int]:
         """Return the joints that can be swept: all but free ones."""
         return [j for j in range(self.model.njnt) if int(self.model.jnt_type[j]) in (_HINGE, _SLIDE, _BALL)]
+
+    def follows(self, joint: int) -> bool:
+        """Return whether an equality puts a joint where another one wants it, or at a place of its own."""
+        return any(joint == coupling.joint for coupling in self._couplings)
 
     def axes(self, joint: int) -> range:
         """Return the axes to sweep a joint about: three for a ball."""
@@ -131,7 +137,10 @@ class PoseMaker:
         return self.rng.uniform(-1.0, 1.0, (count, self.model.nv))
 
     def sweep(self, joint: int, samples: int, axis: int = 0) -> Motion:
-        """Return a sweep of one joint over its range; the others stay, or follow where they are coupled to it."""
+        """Return a sweep of one joint over its range; the others stay, or follow where they are coupled to it.
+
+        A joint that follows another one is moved alone.
+        """
         low, high = self.span(joint)
         at = np.linspace(low, high, samples)
         pairs = [self.place(joint, axis, float(value)) for value in at]
@@ -139,7 +148,8 @@ class PoseMaker:
         if int(self.model.jnt_type[joint]) == _BALL:
             name = f"{name} ({'xyz'[axis]})"
         qpos, tangent = (np.array(part) for part in zip(*pairs, strict=True))
-        return Motion(name, at, qpos, tangent, self._velocities(samples), True, self.number)
+        velocities, alone = self._velocities(samples), self.follows(joint)
+        return Motion(name, at, qpos, tangent, velocities, True, self.number, alone)
 
     def maker(self, joint: int, axis: int = 0) -> Callable[[float], tuple[Array, Array]]:
         """Return the function value -> (pose, tangent) of a sweep, for a closer look between its samples."""

@@ -77,6 +77,32 @@ def test_an_end_point_inside_a_surface_is_the_models_fault() -> None:
     assert "site 'b' is inside geom 'ball'" in told[0]
 
 
+FOLLOWS = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <site name="from" pos="0 0 .1"/>
+    <body><joint name="leader" axis="0 1 0" range="-1 1" limited="true"/><geom size=".01" mass="1"/>
+      <geom name="ball" size=".03" pos=".107 0 .1" contype="0" conaffinity="0"/>
+      <body pos=".1 0 0"><joint name="follower" axis="0 1 0" range="-2 2" limited="true"/>
+        <geom size=".01" mass="1"/><site name="to" pos=".1 0 0"/></body></body>
+  </worldbody>
+  <tendon><spatial name="string"><site site="from"/><geom geom="ball"/><site site="to"/></spatial></tendon>
+  <actuator><muscle name="muscle" tendon="string" lengthrange=".1 .9"/></actuator>
+  <equality><joint joint1="follower" joint2="leader" polycoef=".1 .5 .3 0 0" active="{}"/></equality>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("coupled", [True, False])
+def test_coupled_joints_go_where_motions_lead_them(coupled: bool) -> None:
+    """The follower's own range would take the insertion into the ball; the coupling never does."""
+    model = mujoco.MjModel.from_xml_string(FOLLOWS.format(str(coupled).lower()))
+    found = check_model(model, poses=5, samples=41)
+    assert found.facts["joints_that_follow"] == coupled
+    assert [c.name for c in found.failed] == ([] if coupled else ["model"])
+
+
 def test_a_model_without_muscles_is_refused() -> None:
     with pytest.raises(mw.ModelError, match="no muscles"):
         check_model(mujoco.MjModel.from_xml_string("<mujoco/>"))

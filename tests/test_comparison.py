@@ -272,6 +272,8 @@ def test_coupled_joints_follow_and_tangents_are_derivatives() -> None:
     assert poses.middle()[0] == 0.0
     (summary,) = compare_poses(model, samples=11).muscles.values()
     assert summary.counts == {"AGREE": summary.poses}
+    assert [poses.follows(j) for j in poses.joints()] == [False, True, False]
+    assert [poses.sweep(j, 3).alone for j in poses.joints()] == [False, True, False]
 
 
 def test_a_joint_that_an_equality_holds_is_drawn_there() -> None:

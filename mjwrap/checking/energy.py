@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.outcome import Check
 from mjwrap.errors import ModelError, StateError
+from mjwrap.poses import read_couplings
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 SECONDS, ACTIVATION, LIMIT = 0.1, 0.1, 1e-6
 TIMESTEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # [s]
+HELD = 1e6  # times the armature: a joint that stands still
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -22,6 +24,7 @@ def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return a copy that keeps its energy but for the muscles': no damping, limit, contact, fluid or other actuator.
 
     Hinges and slides get the largest inertia of their kind as armature, so that light ones are as slow as heavy ones.
+    Joints that an equality couples to others get so much more that they stand still: they would leave their places.
     """
     model = copy.copy(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -34,6 +37,8 @@ def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
     for kind in (_HINGE, _SLIDE):
         dofs = np.flatnonzero(kinds == kind)
         model.dof_armature[dofs] += np.max(model.dof_M0[dofs], initial=0.0)
+    coupled = [coupling.joint for coupling in read_couplings(model)]
+    model.dof_armature[model.jnt_dofadr[coupled]] *= HELD
     return model
 
 

@@ -34,7 +34,7 @@ def check_model(
     """Check on a model that paths are tangent, that their derivatives and forces fit, and that nothing jumps.
 
     poses: random ones; samples: of each joint's sweep around the base pose (nq,), qpos0 if None, and around the middle
-    of all ranges; progress: called with (name, done, all). `ModelError` where the model has no muscles. Limits are
+    of all ranges, on which joints that are coupled to it follow; progress: called with (name, done, all). `ModelError` where the model has no muscles. Limits are
     those of the project's design: what holds on every model.
     """
     muscles, data = MuscleSystem(model), mujoco.MjData(model)
@@ -50,7 +50,8 @@ def check_model(
     makers, middle = [maker], maker.middle()
     if len(maker.joints()) > 1 and not np.array_equal(middle, start):
         makers.append(PoseMaker(model, middle, seed, 1))
-    sweeps = [(each, joint, axis) for each in makers for joint in each.joints() for axis in each.axes(joint)]
+    free = [joint for joint in maker.joints() if not maker.follows(joint)]
+    sweeps = [(each, joint, axis) for each in makers for joint in free for axis in each.axes(joint)]
     total = poses + len(sweeps) + 1
     tell = progress or (lambda name, done, all: None)
 
@@ -75,8 +76,10 @@ def check_model(
         tell("sweeps", poses + k, total)
         sweeper.sweep(each, joint, axis, samples)
     tell("energy", total - 1, total)
-    energy = check_energy(model, start)
-    facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples}
+    energy = check_energy(model, maker.base)
+    coupled = len(maker.joints()) - len(free)
+    facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples,
+             "joints_that_follow": coupled}  # fmt: skip
     return Checks([*paths.finish(), speed, arms, *forces, jumps, energy], facts)
 
 

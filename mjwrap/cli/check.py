@@ -54,6 +54,8 @@ def execute(options: argparse.Namespace) -> int:
     facts = found.facts
     muscles = f"{facts['muscles']} muscle{'s' * (facts['muscles'] != 1)}"
     sweeps = f"{facts['sweeps']} sweep{'s' * (facts['sweeps'] != 1)}"
+    if coupled := facts["joints_that_follow"]:
+        sweeps += f" ({coupled} coupled joint{'s follow' if coupled > 1 else ' follows'})"
     poses = f"{facts['random_poses']} random poses and {sweeps} of {facts['poses_of_a_sweep']} poses"
     report.say(f"{options.model}: {muscles} at {poses}")
     report.say(found.table())

@@ -120,12 +120,18 @@ def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
         key = jump.program, jump.muscle, jump.sweep
         if key not in largest or abs(jump.length) > abs(largest[key].length):
             largest[key] = jump
-    say(f"\njumps along the sweeps: {len(jumps)}, the largest of each muscle and joint")
+    say(f"\njumps along the sweeps: {len(jumps)}{starred(jumps)}; the largest of each muscle and joint")
     for jump in sorted(largest.values(), key=lambda j: (j.program, j.muscle, j.sweep)):
         say(
-            f"  {jump.program} {jump.muscle} at {jump.sweep} = {jump.at:.6f}: {1e3 * jump.length:+.3f} mm, "
+            f"  {jump.program} {jump.muscle} at {jump.where}: {1e3 * jump.length:+.3f} mm, "
             f"moment arm {-1e3 * jump.slope:+.3f} mm; {jump.before} -> {jump.after}"
         )
+
+
+def starred(jumps: Sequence[Jump]) -> str:
+    """Say how many of some jumps are at joints that were moved without those that they are coupled to."""
+    alone = sum(jump.alone for jump in jumps)
+    return f", {alone} of them (*) at joints that follow others and were moved alone" if alone else ""
 
 
 def where(extreme: Extreme) -> str:

@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import mujoco
 
 import mjwrap
-from mjwrap.cli.compare_files import TITLES, where
+from mjwrap.cli.compare_files import TITLES, starred, where
 from mjwrap.cli.output import Output
 from mjwrap.cli.plot_compare import COLOURS, draw_motion, draw_sweep
 from mjwrap.comparison import (
@@ -103,8 +103,8 @@ def _facts(found: PoseComparison, verdicts: dict[str, Verdict]) -> str:
         (f"{equal}", "equal at every pose"),
         (f"{len(both) - equal}", "differ somewhere"),
         (f"{len(found.muscles) - len(both)}", "stay with MuJoCo's own tendon"),
-        (_count(jumps["MuJoCo"]), "jumps of MuJoCo's tendons along the sweeps"),
-        (_count(jumps["mjwrap"]), "jumps of mjwrap's paths along the sweeps"),
+        (_count(jumps["MuJoCo"]), f"jumps of MuJoCo's tendons along the sweeps{starred(jumps['MuJoCo'])}"),
+        (_count(jumps["mjwrap"]), f"jumps of mjwrap's paths along the sweeps{starred(jumps['mjwrap'])}"),
         (f"{found.at_fault}", "poses at which mjwrap is at fault"),
     ]
     return (
@@ -254,7 +254,7 @@ def _jumps(jumps: Sequence[Jump]) -> str:
     return _table(
         ("<jump of", "<at", "length [mm]", "moment arm [mm]", "<before", "<after"),
         [
-            [_text(j.program), f"{_text(j.sweep)} = {j.at:.6f}", f"{1e3 * j.length:+.3f}", f"{-1e3 * j.slope:+.3f}",
+            [_text(j.program), _text(j.where), f"{1e3 * j.length:+.3f}", f"{-1e3 * j.slope:+.3f}",
              _text(j.before), _text(j.after)]
             for j in sorted(jumps, key=lambda j: (j.program, -abs(j.length)))
         ],

@@ -22,7 +22,7 @@ class Jump:
     """A jump of one program's path: where, by how much [m, m/rad], and what the path was before and after.
 
     base: the number of the pose around which the joint was swept; other_smooth: whether the other program had a path
-    there that did not jump.
+    there that did not jump; alone: whether the joint is coupled to another one, so that no motion leads there.
     """
 
     program: str
@@ -35,6 +35,12 @@ class Jump:
     after: str
     base: int = 0
     other_smooth: bool = False
+    alone: bool = False
+
+    @property
+    def where(self) -> str:
+        """Where it is, with a star where the joint was moved alone."""
+        return f"{self.sweep}{' *' * self.alone} = {self.at:.6f}"
 
 
 def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, axis: int = 0) -> list[Jump]:
@@ -59,7 +65,11 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
                     continue
                 seen.append(jump[0])
                 before, after = _sides(comparer, twin, program, place, jump[0], float(np.ptp(motion.at)))
-                found.append(Jump(program, twin.name, motion.name, *jump, before, after, motion.base))
+                found.append(
+                    Jump(
+                        program, twin.name, motion.name, *jump, before, after, motion.base, alone=motion.alone
+                    )
+                )
     return [_beside(jump, found, batch) for jump in found]
 
 

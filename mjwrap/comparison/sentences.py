@@ -99,4 +99,7 @@ def _jumps(jumps: Sequence[Jump], program: str) -> str:
         return ""
     length, slope = max(abs(jump.length) for jump in own), max(abs(jump.slope) for jump in own)
     s = "s" * (len(own) != 1)
+    alone = sum(jump.alone for jump in own)
+    if alone:
+        s += f" ({alone if alone < len(own) else 'all'} with a coupled joint moved alone)"
     return f"{program} jumps {len(own)} time{s}, by up to {1e3 * length:.3g} mm and {1e3 * slope:.3g} mm/rad"
