@@ -34,8 +34,8 @@ def check_model(
     """Check on a model that paths are tangent, that their derivatives and forces fit, and that nothing jumps.
 
     poses: random ones; samples: of each joint's sweep around the base pose (nq,), qpos0 if None, and around the middle
-    of all ranges, on which joints that are coupled to it follow; progress: called with (name, done, all). `ModelError` where the model has no muscles. Limits are
-    those of the project's design: what holds on every model.
+    of all ranges, on which joints that are coupled to it follow; progress: called with (name, done, all). `ModelError`
+    where the model has no muscles. Limits are those of the project's design: what holds on every model.
     """
     muscles, data = MuscleSystem(model), mujoco.MjData(model)
     if not muscles.n:
