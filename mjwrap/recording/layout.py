@@ -28,6 +28,7 @@ GROUP_TITLES = {
     "power": "sum of powers [W]",
     "without_path": "muscles without a path",
 }
+LINE = 0.17  # height of a legend's line, as part of a small plot's
 LEGEND = 16  # joints whose names fit beside their curves
 SIDE = 6  # joints whose moment arms are shown together
 MANY = 100  # muscles from which on their forces hide more than they show
@@ -98,11 +99,11 @@ def _plot(
     )
 
 
-def _grid(views: Sequence[rrb.View], name: str) -> rrb.Container:
-    """Two columns of plots, with room for a legend in the first row; one column where they are few."""
+def _grid(views: Sequence[rrb.View], name: str, names: int = PAGE) -> rrb.Container:
+    """Two columns of plots, with room for a legend of so many names in the first row; one column where they are few."""
     if len(views) <= 3:
         return rrb.Vertical(contents=views, name=name)
-    shares = [1.3] + [1.0] * ((len(views) - 1) // 2)
+    shares = [max(1.3, LINE * names + 0.4)] + [1.0] * ((len(views) - 1) // 2)
     return rrb.Grid(contents=views, grid_columns=2, row_shares=shares, name=name)
 
 
@@ -112,7 +113,8 @@ def _overview(scene: Scene) -> rrb.Container:
         _plot(scene.group_series[q], title, legend=q == "activation", unit=q == "activation")
         for q, title in GROUP_TITLES.items()
     ]
-    return rrb.Vertical(contents=views, row_shares=[2.4, 1, 1, 1], name="all groups")
+    legend = max(2.4, 1.5 * LINE * len(scene.groups))
+    return rrb.Vertical(contents=views, row_shares=[legend, 1, 1, 1], name="all groups")
 
 
 def _page(scene: Scene, page: list[int], first: First, name: str) -> rrb.Container:
@@ -125,7 +127,7 @@ def _page(scene: Scene, page: list[int], first: First, name: str) -> rrb.Contain
     views += _main_joint(scene, page, first)
     if len(views) % 2:
         views.append(_plot((scene.series["iterations"][i] for i in page), TITLES["iterations"]))
-    return _grid(views, name)
+    return _grid(views, name, len(page))
 
 
 def _main_joint(scene: Scene, page: list[int], first: First) -> list[rrb.View]:
