@@ -133,14 +133,16 @@ class History:
         positions, quaternions = zip(*self._poses[:frames], strict=True)
         return np.array(positions), np.array(quaternions)
 
-    def polylines(self, frames: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def polylines(self, frames: int, room: Any = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         points, counts = self._ragged(0, frames)
         return points, counts[counts > 0], (counts > 0).astype(np.int64)
 
-    def contacts(self, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    def contacts(self, frames: int, room: Any = None) -> tuple[np.ndarray, np.ndarray]:
         return self._ragged(1, frames)
 
-    def arrows(self, frames: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def arrows(
+        self, frames: int, scale: float, room: Any = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arrows, counts = self._ragged(2, frames)
         return arrows[:, 0], scale * arrows[:, 1], counts
 

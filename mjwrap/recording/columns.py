@@ -71,23 +71,24 @@ def scalar_table(entities: Sequence[str]) -> Table:
     return Table((entity, rr.Scalars.descriptor_scalars(), pa.float64()) for entity in entities)
 
 
-def scalar_columns(values: Array) -> list[pa.Array]:
-    """Values (T, m) as m columns of T rows."""
+def scalar_columns(values: Array, room: Array) -> list[pa.Array]:
+    """Values (T, m) as m columns of T rows; they stand in room (m, T)."""
     rows, columns = values.shape
+    room[:] = values.T
     # one array holds all columns, one after the other; a column is a slice of it, which costs next to nothing
-    whole = pa.ListArray.from_arrays(
-        _one_each(rows * columns), pa.array(np.ascontiguousarray(values.T).ravel())
-    )
+    whole = pa.ListArray.from_arrays(_one_each(rows * columns), pa.array(room.ravel()))
     return [whole.slice(i * rows, rows) for i in range(columns)]
 
 
-def vector_columns(values: Array, widths: Sequence[int]) -> list[pa.Array]:
-    """Values (T, sum of widths) as a column of T rows for each width, with so many values a row."""
-    ends = np.cumsum(widths)[:-1]
-    return [
-        pa.ListArray.from_arrays(_one_each(len(part), part.shape[1]), pa.array(part.ravel()))
-        for part in np.split(values, ends, axis=1)
-    ]
+def vector_columns(values: Array, widths: Sequence[int], room: Array) -> list[pa.Array]:
+    """Values (T, K) as a column of T rows for each width, with so many values a row; they stand in room (T K,)."""
+    rows, columns, start = len(values), [], 0
+    for width in widths:
+        part = room[rows * start : rows * (start + width)]
+        part.reshape(rows, width)[:] = values[:, start : start + width]
+        columns.append(pa.ListArray.from_arrays(_one_each(rows, width), pa.array(part)))
+        start += width
+    return columns
 
 
 def text_table(entity: str) -> Table:

@@ -12,6 +12,7 @@ from mjwrap.recording import columns
 from mjwrap.recording.layout import First, blueprint
 from mjwrap.recording.scene import Scene
 from mjwrap.recording.stream import Stream
+from mjwrap.system.history import Room
 
 if TYPE_CHECKING:
     from mjwrap.system.results import Results
@@ -77,6 +78,7 @@ class Buffers:
         )
         self._force_scale = options.force_scale
         self._tables = _tables(scene)
+        self._room = Room()
         self._before = np.zeros(len(scene.muscle_names))  # status of the last row that was taken
         self._rows = self._frames = 0
         self._last_time = self._next_time = -math.inf
@@ -132,8 +134,13 @@ class Buffers:
             first = First(np.empty((0, 3)), np.empty((0, 3)), [])
         stream.blueprint(blueprint(self._scene, first))
 
-    def take(self) -> list[pa.RecordBatch]:
-        """All rows as record batches; the buffers are empty afterwards."""
+    def take(self, done: bool) -> list[pa.RecordBatch]:
+        """All rows as record batches; the buffers are empty afterwards.
+
+        done: whether the batches that were taken before are written, so that theirs may be overwritten.
+        """
+        if not done:
+            self._room = Room()
         batches = self._take_states() if self._rows else []
         if self._frames:
             batches += self._take_frames()
@@ -152,8 +159,8 @@ class Buffers:
             "power": self._summed(values["power"]),
             "without_path": self._summed(lost),
         }
-        summed = [groups[name] for name in self._scene.group_series]
-        cells = [column for each in [*values.values(), *summed] for column in columns.scalar_columns(each)]
+        series = values | {f"groups {name}": groups[name] for name in self._scene.group_series}
+        cells = [column for name, each in series.items() for column in self._scalars(name, each)]
         batches = [self._tables["scalars"].batch(times, cells)]
         before = np.vstack([self._before, values["status"][:-1]])
         rows, muscles = np.nonzero(values["status"] != before)
@@ -168,6 +175,10 @@ class Buffers:
         self._before = values["status"][-1].copy()
         return batches
 
+    def _scalars(self, name: str, values: np.ndarray) -> list[pa.Array]:
+        """Columns of values (T, m) that stand in the room of a name."""
+        return columns.scalar_columns(values, self._room.array(name, values.shape[::-1]))
+
     def _summed(self, values: np.ndarray) -> np.ndarray:
         """Sums of values (T, n) over each group, (T, groups)."""
         order, starts = self._scene.by_group
@@ -181,19 +192,20 @@ class Buffers:
             poses = (array[:, moving] for array in self._history.bodies(self._frames))
             batches.append(self._tables["poses"].batch(times, columns.pose_columns(*poses)))
         if self._joints:
-            cells = columns.scalar_columns(self._qpos[: self._frames, self._joints])
+            cells = self._scalars("joint", self._qpos[: self._frames, self._joints])
             batches.append(self._tables["joints"].batch(self._qpos_time[: self._frames], cells))
         if self._widths:
             arms = self._history.moment_arms(self._frames)
+            room = self._room.array("moment_arm", (arms.size,))
             batches.append(
-                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths))
+                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, room))
             )
         colors = columns.activation_colors(self._history.states(self._rows)["activation"][rows])
         history, frames = self._history, self._frames
         drawn = (
-            history.polylines(frames),
-            history.contacts(frames),
-            history.arrows(frames, self._force_scale or 1.0),
+            history.polylines(frames, self._room),
+            history.contacts(frames, self._room),
+            history.arrows(frames, self._force_scale or 1.0, self._room),
         )
         cells = columns.path_columns(*drawn, colors)
         batches.append(self._tables["paths"].batch(times, cells))

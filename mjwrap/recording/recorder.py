@@ -124,7 +124,7 @@ class Recorder:
             self._laid_out = True
 
     def _flush(self) -> None:
-        self._stream.send(self._buffers.take())
+        self._stream.send(self._buffers.take(done=self._stream.wait()))
         self._batch_due = time.perf_counter() + LIVE
 
     def _finish(self) -> None:

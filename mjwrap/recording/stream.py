@@ -61,25 +61,26 @@ class Stream:
         self._recording.send_blueprint(blueprint)
 
     def send(self, batches: list[pa.RecordBatch]) -> None:
-        """Hand columns to the writer, which works while the simulation runs on.
-
-        Waits first for the columns handed over before, so that a full disk shows after at most one batch
-        and memory holds at most two.
-        """
-        self.wait()
+        """Hand columns to the writer, which works while the simulation runs on; `wait` comes before."""
         for batch in batches:
             if batch.num_columns > 1:  # a model without muscles, or without bodies, has times alone
                 rr.send_record_batch(batch, recording=self._recording)
 
-    def wait(self) -> None:
-        """Return once everything sent is on its way to the file, or with the viewer."""
+    def wait(self) -> bool:
+        """Return once everything sent is on its way to the file, or with the viewer, and whether that is certain.
+
+        So a full disk shows after at most one batch. Where a viewer goes away beside a file it is not certain.
+        """
         try:
             self._recording.flush()
         except (RuntimeError, ValueError, OSError) as error:
             if self._url is None or "gRPC" not in str(error):
                 raise self._failure(error) from error
             self._viewer_gone(error)
+            self._check()
+            return False
         self._check()
+        return True
 
     def finish(self) -> None:
         """Write the table of contents of a file, close it and read that table back."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -17,6 +18,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
+
+
+class Room:
+    """Arrays that are used again, by name: memory that the system has once given costs nothing the next time."""
+
+    def __init__(self) -> None:
+        self._held: dict[str, NDArray[Any]] = {}
+
+    def array(self, name: str, shape: tuple[int, ...], kind: type[np.generic] = np.float64) -> NDArray[Any]:
+        """Return an array whose values are left to chance; what had this name before may change with it."""
+        size = math.prod(shape)
+        if name not in self._held or self._held[name].size < size:
+            self._held[name] = np.empty(size, dtype=kind)
+        return self._held[name][:size].reshape(shape)
 
 
 class Store:
@@ -35,9 +50,9 @@ class Store:
             rows[:begin] = self.rows[:begin]
             self.rows = rows
 
-    def room(self, frames: int) -> Singles:
-        """Return room for the points of the first frames in another order."""
-        return np.empty((int(self.starts[frames - 1, -1]) if frames else 0, 3), dtype=np.float32)
+    def count(self, frames: int) -> int:
+        """Return the number of rows of the first frames."""
+        return int(self.starts[frames - 1, -1]) if frames else 0
 
 
 class History:
@@ -45,7 +60,7 @@ class History:
 
     A state is what every muscle has, a frame what is drawn: poses of the bodies, paths, contact points, forces, and
     moment arms of the pairs of a muscle and a coordinate that `muscles` and `dofs` (K,) name. Time goes along the first
-    axis of what is read as numbers. Points are in 32 bits.
+    axis of what is read as numbers. Points are in 32 bits; they stand in a Room, if one is given.
     """
 
     def __init__(
@@ -111,38 +126,41 @@ class History:
         """Return positions (frames, nbody, 3) [m] and quaternions (frames, nbody, 4) w-x-y-z of the bodies."""
         return self._positions[:frames], self._quaternions[:frames]
 
-    def polylines(self, frames: int) -> tuple[Singles, Ints, Ints]:
+    def polylines(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints, Ints]:
         """Return the paths of the first frames: points (m, 3) [m], sizes (S,) and counts (n, frames) of strips.
 
         A pulley parts a muscle's path into several strips. They come by muscle, then by frame; sizes says how many
         points each has, counts how many strips a muscle has in a frame: none where no path was found yet.
         """
         store, routes = self._points, self._plan[0]
-        out, counts = store.room(frames), self._counts(frames)
+        out, counts = self._room(room, "points", store, frames)
         sizes = np.empty(len(routes) * frames, dtype=np.int64)
         count = footage.gather_strips(store.rows, store.starts, routes, out, sizes, counts)
         return out, sizes[:count], counts
 
-    def contacts(self, frames: int) -> tuple[Singles, Ints]:
+    def contacts(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints]:
         """Return the contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
         store = self._contacts
-        out, counts = store.room(frames), self._counts(frames)
+        out, counts = self._room(room, "contacts", store, frames)
         footage.gather(store.rows, store.starts, out, counts)
         return out, counts
 
-    def arrows(self, frames: int, scale: float) -> tuple[Singles, Singles, Ints]:
+    def arrows(self, frames: int, scale: float, room: Room | None = None) -> tuple[Singles, Singles, Ints]:
         """Return the forces on bodies as arrows, by muscle, then frame: tails, vectors (m, 3) [m], counts (n, frames).
 
         A vector is `scale` [m/N] times the force, world frame. Pulls start at the origin and at the insertion; what
         presses a surface or a via point, the sum over the contact, ends midway between the contact points.
         """
         store = self._forces
-        tails, vectors, counts = store.room(frames), store.room(frames), self._counts(frames)
+        tails, counts = self._room(room, "tails", store, frames)
+        vectors, _ = self._room(room, "vectors", store, frames)
         footage.gather_arrows(store.rows, store.starts, float(scale), tails, vectors, counts)
         return tails, vectors, counts
 
-    def _counts(self, frames: int) -> Ints:
-        return np.empty((self._results.n, frames), dtype=np.int64)
+    def _room(self, room: Room | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
+        """Return room for the points of a store's first frames in another order, and for their counts."""
+        points = (room or Room()).array(name, (store.count(frames), 3), np.float32)
+        return points, np.empty((self._results.n, frames), dtype=np.int64)
 
     def moment_arms(self, frames: int) -> Array:
         """Return −∂l/∂q (frames, K) of the pairs [m], or 1 about a slide."""
