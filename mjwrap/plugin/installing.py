@@ -17,6 +17,7 @@ from mjwrap.plugin.image import loaded_bodies, state_size
 from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders, show_placeholder
 from mjwrap.plugin.resting import rest_actuators
 from mjwrap.plugin.transmission import check_room
+from mjwrap.plugin.undo import undone_on_error
 from mjwrap.plugin.viewing import drawing
 from mjwrap.takeover import Takeover
 
@@ -32,13 +33,18 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
     force MuJoCo itself computes (muscles of other laws act by wrenches). keep_tendons: let MuJoCo go on computing the
     tendons that only say where a muscle runs; else the returned model leaves out those that nothing else needs. The
     plugin draws the muscles. Raises `ModelError` where its muscles cannot be read, or a moment has no room;
-    `VersionError` where MuJoCo is unknown.
+    `VersionError` where MuJoCo is unknown; the spec is then as it was.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
     if mode not in (reg.WRENCH, reg.TRANSMISSION):
         raise ModelError(f"mode '{mode}' does not exist; modes: {reg.WRENCH}, {reg.TRANSMISSION}")
     reg.register()
+    with undone_on_error(spec):
+        return _installed(spec, mode, keep_tendons)
+
+
+def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjModel:
     for element in [p for p in spec.plugins if p.plugin_name == reg.NAME and p.name == reg.INSTANCE]:
         for name in _claim(element).muscles:  # installed before: read the muscles anew
             _wake(spec.actuator(name))

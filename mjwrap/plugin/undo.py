@@ -1,0 +1,49 @@
+"""An MjSpec as it was, where putting the plugin into it has failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+
+from mjwrap.plugin.register import NAME
+
+_CLAMP = ("forcelimited", "forcerange", "gainprm", "biasprm")
+
+
+@contextmanager
+def undone_on_error(spec: mujoco.MjSpec) -> Iterator[None]:
+    """Give a spec back what `install` changes in it where the block raises: clamps, widths, sleep, the instance.
+
+    That the plugin may be used stays, which MuJoCo has no call to take back and which means nothing by itself.
+    """
+    actuators = [(each, [_kept(getattr(each, name)) for name in _CLAMP]) for each in spec.actuators]
+    widths = [(each, each.width) for each in spec.tendons]
+    bodies = [(each, each.sleep, each.plugin.active) for each in spec.bodies[1:]]
+    instances = [(each, dict(each.config)) for each in spec.plugins if each.plugin_name == NAME]
+    try:
+        yield
+    except BaseException:
+        for actuator, values in actuators:
+            for name, value in zip(_CLAMP, values, strict=True):
+                setattr(actuator, name, value)
+        for tendon, width in widths:
+            tendon.width = width
+        for body, sleep, active in bodies:
+            body.sleep = sleep
+            if not active and body.plugin.active:
+                body.plugin.name = body.plugin.plugin_name = ""
+                body.plugin.active = False
+        known = {each.name for each, _ in instances}
+        for element in [p for p in spec.plugins if p.plugin_name == NAME and p.name not in known]:
+            spec.delete(element)
+        for element, config in instances:
+            element.config = config
+        raise
+
+
+def _kept(value: object) -> object:
+    """Return a value that stays as it is: arrays of a spec show what is set later."""
+    copy = getattr(value, "copy", None)
+    return copy() if callable(copy) else value
