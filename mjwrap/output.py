@@ -6,9 +6,12 @@ import signal
 import stat
 import threading
 import uuid
-from collections.abc import Iterator
+import warnings
+import weakref
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import IO, Any, Self
 
 import numpy as np
 
@@ -18,23 +21,27 @@ from mjwrap.errors import RecordingError
 class PartFile:
     """A temporary file beside `path`, created empty at once, so that an unwritable place shows before a run.
 
-    `publish` gives it the name `path` in one step, which replaces an older recording of that name;
-    `discard` removes it. Until then an existing `path` stays as it is.
+    `part` is written to; `publish` gives it the name `path` in one step, which replaces an older file of that name;
+    `discard` removes it. Until then an existing `path` stays as it is. `option` is what the place was given by,
+    for messages.
 
     Raises RecordingError where `path` ends in none of the suffixes, names something other than a regular file, may
     not be overwritten, or lies in a folder that is missing or cannot be written.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *suffixes: str) -> None:
+    def __init__(self, path: str | os.PathLike[str], *suffixes: str, option: str = "") -> None:
         self.path = Path(path)
-        if self.path.suffix not in suffixes:
+        self._named = f"{option} '{self.path}'".lstrip()
+        self._text: IO[str] | None = None
+        if self.path.suffix.lower() not in suffixes:
             first = suffixes[0]
             example = self.path.with_suffix(first) if self.path.name else self.path / f"run{first}"
             raise RecordingError(
-                f"cannot record to '{self.path}': the name must end in {' or '.join(suffixes)}, by which viewers "
+                f"cannot write {self._named}: the name must end in {' or '.join(suffixes)}, by which programs "
                 f"know what it is; for example '{example}'"
             )
-        self.part = self.path.with_name(f".{self.path.name}.{os.getpid()}-{uuid.uuid4().hex[:8]}.part")
+        unique = f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
+        self.part = self.path.with_name(f".{self.path.stem}.{unique}.part{self.path.suffix}")
         try:
             fault = self._overwrite_fault()
             if not fault:
@@ -42,7 +49,7 @@ class PartFile:
         except OSError as error:
             fault = _reason(error, self.path)
         if fault:
-            raise RecordingError(f"cannot record to '{self.path}': {fault}")
+            raise RecordingError(f"cannot write {self._named}: {fault}")
 
     def _overwrite_fault(self) -> str:
         """Say why `path`, where it exists, may not be replaced."""
@@ -56,22 +63,121 @@ class PartFile:
             return "it is a device or a pipe, not a file"
         return "" if os.access(self.path, os.W_OK) else "it exists and is write-protected"
 
-    def publish(self) -> None:
-        """Give the finished file its name."""
+    def open_text(self) -> IO[str]:
+        """Return the part, open for text; it is closed with the rest."""
+        self._text = self.part.open("w", encoding="utf-8", newline="")
+        return self._text
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turn what the disk refuses inside a with block into a RecordingError."""
         try:
-            os.replace(self.part, self.path)
+            yield
+        except RecordingError:
+            raise
         except OSError as error:
             raise self.failure(error) from error
+
+    def publish(self) -> None:
+        """Put the finished file on the disk and give it its name."""
+        with self.writing():
+            if self._text is not None:
+                self._text.close()
+            with self.part.open("rb+") as file:
+                os.fsync(file.fileno())
+            os.replace(self.part, self.path)
 
     def discard(self) -> None:
         """Remove the temporary file, if it is still there."""
         with contextlib.suppress(OSError):
+            if self._text is not None:
+                self._text.close()
+        with contextlib.suppress(OSError):
             self.part.unlink(missing_ok=True)
 
     def failure(self, error: Exception) -> RecordingError:
-        """The error to raise where `error` ended the recording."""
+        """The error to raise where `error` ended the writing."""
         reason = _reason(error, self.path) if isinstance(error, OSError) else str(error)
-        return RecordingError(f"recording to '{self.path}' failed: {reason}; nothing was kept")
+        return RecordingError(f"writing {self._named} failed: {reason}; nothing was kept of it")
+
+
+class RunLog:
+    """What a run is logged to: complete once it is closed, and nothing where the run ends with an error.
+
+    A subclass calls `_begin` at the end of its `__init__`, acts on the file inside `_guarded` only, and completes
+    what it writes in `_finish`. `_ended` says why no more can be logged.
+    """
+
+    _ended = ""
+    _place: str
+    _target: PartFile | None
+
+    def _begin(self, place: str, target: PartFile | None, release: Callable[[], object]) -> None:
+        """Start the life of the log; release: lets go of what it holds, complete or not, and knows nothing of it."""
+        self._place, self._target, self._release = place, target, release
+        self._finalizer = weakref.finalize(self, _forgotten, type(self).__name__, place, target, release)
+
+    def _finish(self) -> None:
+        """Complete the file; it has its name afterwards."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Write what is left, check that it is complete and give the file its name; a second call does nothing.
+
+        Raises RecordingError, and leaves nothing behind, where the disk is full.
+        """
+        if not self._ended:
+            self._guarded(self._publish)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None and issubclass(kind, Exception):
+            self._discard("the run ended with an error and nothing was kept")
+        else:
+            self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is kept
+
+    def _publish(self) -> None:
+        self._finish()
+        if self._target:
+            self._target.publish()
+        self._ended = "it is closed"
+        self._finalizer.detach()
+
+    def _guarded(self, action: Callable[[], None]) -> None:
+        """Act whole or not at all: Ctrl-C waits for the end, an error removes the file."""
+        with uninterrupted():
+            try:
+                with self._target.writing() if self._target else contextlib.nullcontext():
+                    action()
+            except BaseException as error:
+                self._discard(f"it failed before ({error})")
+                raise
+
+    def _discard(self, why: str) -> None:
+        if not self._ended:
+            self._ended = why
+            self._finalizer.detach()
+            _let_go(self._target, self._release)
+
+
+def _let_go(target: PartFile | None, release: Callable[[], object]) -> None:
+    with contextlib.suppress(Exception):  # nothing is kept, whatever the rest of it says
+        release()
+    if target:
+        target.discard()
+
+
+def _forgotten(kind: str, place: str, target: PartFile | None, release: Callable[[], object]) -> None:
+    _let_go(target, release)
+    warnings.warn(
+        f"the {kind} of '{place}' was never closed, so nothing was kept; use it in a with statement",
+        RuntimeWarning,
+        stacklevel=2,
+    )
 
 
 @contextlib.contextmanager

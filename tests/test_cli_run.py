@@ -243,7 +243,7 @@ def test_a_model_without_muscles_runs(tmp_path: Path, capsys: pytest.CaptureFixt
         ([ELBOW, "--prescribe", "elbow_flexion=sine:1,1", "--qpos", "elbow_flexion=1"], "is prescribed"),
         ([ELBOW, "--plot", "{folder}/missing/p.png"], "there is no folder.*missing"),
         ([ELBOW, "--plot", "{folder}/p.docx"], r"must end in \.png or \.pdf or \.svg"),
-        ([ELBOW, "--csv", "{folder}/sub.csv"], "not a file"),
+        ([ELBOW, "--csv", "{folder}/sub.csv"], "it is a folder"),
         ([ELBOW, "--record", "{folder}/missing/r.rrd"], "no folder"),
         ([ELBOW, "--record", "{folder}/r.bin"], r"must end in \.rrd"),
         ([ELBOW, "--out", "{folder}/t.xlsx"], r"must end in \.sto or \.mot or \.csv or \.npz"),

@@ -29,7 +29,7 @@ from mjwrap.cli.arguments import at_least, not_negative
 from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_poses, tell_tables
 from mjwrap.cli.errors import FAULTS, UserError
 from mjwrap.cli.models import load, start_keyframe, start_state
-from mjwrap.cli.output import Output, Report, add_json
+from mjwrap.cli.output import Report, add_json, open_output
 from mjwrap.cli.progress import Stages, need_matplotlib
 from mjwrap.cli.states import read_states
 from mjwrap.comparison import (
@@ -106,9 +106,9 @@ def execute(options: argparse.Namespace) -> int:
     muscles = MuscleSystem(model)
     names = choose(muscles, options.muscles)
     Excitation(muscles, options.excitation, options.seed)  # so that a mistake in it shows before the work
-    plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
-    page = Output(options.report, "--report", (".html", ".htm")) if options.report else None
-    table = Output(options.csv, "--csv", (".csv",)) if options.csv else None
+    plot = open_output(options.plot, "--plot", ".png", ".pdf", ".svg") if options.plot else None
+    page = open_output(options.report, "--report", ".html", ".htm") if options.report else None
+    table = open_output(options.csv, "--csv", ".csv") if options.csv else None
     report = Report(options.json)
     given = read_tables(options, model, muscles, start)
     if plot is not None or page is not None:

@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 
 import mjwrap
-from mjwrap.cli.output import Output
 from mjwrap.comparison import (
     AGREE,
     Jump,
@@ -24,6 +23,7 @@ from mjwrap.comparison import (
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch
 from mjwrap.comparison.verdict import Extreme, differences, outcomes
+from mjwrap.output import PartFile
 
 TITLES = {
     Outcome.AGREE: "equal",
@@ -47,7 +47,7 @@ Say = Callable[[str], object]
 class PoseTable:
     """A CSV file with a row for every muscle and pose, written while they are compared. SI units."""
 
-    def __init__(self, output: Output) -> None:
+    def __init__(self, output: PartFile) -> None:
         self._output = output
         self._writer = csv.writer(output.open_text())
         with output.writing():

@@ -16,7 +16,6 @@ import mujoco
 
 import mjwrap
 from mjwrap.cli.compare_files import TITLES, starred, where
-from mjwrap.cli.output import Output
 from mjwrap.cli.plot_compare import COLOURS, draw_motion, draw_sweep
 from mjwrap.comparison import (
     AGREE,
@@ -28,6 +27,7 @@ from mjwrap.comparison import (
     TableDifference,
     Verdict,
 )
+from mjwrap.output import PartFile
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; }
@@ -58,7 +58,7 @@ _RIGHT = {
 
 
 def write_page(
-    output: Output,
+    output: PartFile,
     model: str,
     command: str,
     found: PoseComparison,

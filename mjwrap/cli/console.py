@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
 
 from mjwrap.cli.errors import INTERRUPTED, RUN_FAILED, USER_ERROR, RunError, UserError
-from mjwrap.cli.output import Output
+from mjwrap.cli.output import discard_outputs
 from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
 
 _INPUTS = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
@@ -70,7 +70,7 @@ def run(name: str, body: Callable[[], int]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return RUN_FAILED
     finally:
-        Output.discard_open()
+        discard_outputs()
 
 
 def _say(name: str, error: object, code: int) -> int:

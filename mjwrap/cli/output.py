@@ -1,90 +1,43 @@
-"""Output files that appear whole or not at all."""
+"""What a command leaves: output files that appear whole or not at all, and what it says, as text or as JSON."""
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import math
-import os
-import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import IO, Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
-from mjwrap.cli.errors import RunError, UserError
+from mjwrap.cli.errors import UserError
+from mjwrap.errors import RecordingError
+from mjwrap.output import PartFile
 
-
-class Output:
-    """A file that appears whole, under its own name, or not at all.
-
-    The place is tried at once, so that an unwritable one shows before a run. `part` is written to, `publish` gives it
-    the name `path`; an older file of that name stays until then. What is not published is removed at the end.
-    """
-
-    _open: list[Output] = []  # noqa: RUF012
-
-    def __init__(self, path: str, option: str, suffixes: Sequence[str]) -> None:
-        self.path, self.option = Path(path), option
-        self._file: IO[str] | None = None
-        if self.path.suffix.lower() not in suffixes:
-            raise UserError(f"{option} '{path}': the name must end in {' or '.join(suffixes)}")
-        if any(other.path.resolve() == self.path.resolve() for other in Output._open):
-            raise UserError(f"{option} '{path}': another output goes to the same file")
-        if self.path.exists() and not (self.path.is_file() and os.access(self.path, os.W_OK)):
-            raise UserError(f"cannot write {option} '{path}': it is not a file, or write-protected")
-        unique = f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
-        self.part = self.path.with_name(f".{self.path.stem}.{unique}.part{self.path.suffix}")
-        try:
-            self.part.open("xb").close()
-        except OSError as error:
-            raise UserError(f"cannot write {option} '{path}': {_reason(error, self.path)}") from None
-        Output._open.append(self)
-
-    def open_text(self) -> IO[str]:
-        """Return the part, open for text; it is closed with the output."""
-        self._file = self.part.open("w", encoding="utf-8", newline="")
-        return self._file
-
-    def publish(self) -> None:
-        """Put the finished file on the disk and give it its name."""
-        with self.writing():
-            if self._file is not None:
-                self._file.close()
-            with self.part.open("rb+") as file:
-                os.fsync(file.fileno())
-            os.replace(self.part, self.path)
-        Output._open.remove(self)
-
-    @contextlib.contextmanager
-    def writing(self) -> Iterator[None]:
-        """Turn what the disk refuses inside a with block into an error in one line."""
-        try:
-            yield
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise RunError(
-                f"writing {self.option} '{self.path}' failed: {reason}; nothing was kept of it"
-            ) from None
-
-    @classmethod
-    def discard_open(cls) -> None:
-        """Remove every part that has not become a file."""
-        for output in cls._open:
-            with contextlib.suppress(OSError):
-                if output._file is not None:
-                    output._file.close()
-            with contextlib.suppress(OSError):
-                output.part.unlink(missing_ok=True)
-        cls._open.clear()
+Kept = TypeVar("Kept")
+_files: list[PartFile] = []  # of the command that runs
 
 
-def _reason(error: OSError, path: Path) -> str:
-    folder = path.absolute().parent
-    if isinstance(error, FileNotFoundError) and not folder.exists():
-        existing = next(parent for parent in folder.parents if parent.exists())
-        return f"there is no folder '{folder}' (the path exists as far as '{existing}')"
-    return (error.strerror or str(error)).lower()
+def open_output(path: str, option: str, *suffixes: str) -> PartFile:
+    """Return a file to be written; what is wrong with its place is the user's to mend, before the run."""
+    file = opened(lambda: PartFile(path, *suffixes, option=option))
+    _files.append(file)
+    if any(other.path.resolve() == file.path.resolve() for other in _files[:-1]):
+        raise UserError(f"{option} '{path}': another output goes to the same file")
+    return file
+
+
+def opened(make: Callable[[], Kept]) -> Kept:
+    """Return a file, recording or film that has been begun; what is wrong with its place is the user's to mend."""
+    try:
+        return make()
+    except RecordingError as error:
+        raise UserError(str(error)) from None
+
+
+def discard_outputs() -> None:
+    """Remove what has not become a file."""
+    for file in _files:
+        file.discard()
+    _files.clear()
 
 
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
@@ -103,8 +56,7 @@ class Report:
 
     def __init__(self, path: str | None) -> None:
         self._instead = path == "-"
-        self._path = path
-        self._file = Output(path, "--json", (".json",)) if path and not self._instead else None
+        self._file = open_output(path, "--json", ".json") if path and not self._instead else None
 
     def say(self, text: str = "") -> None:
         """Print a line of text, unless JSON takes its place."""
@@ -120,7 +72,7 @@ class Report:
             with self._file.writing():
                 self._file.part.write_text(text + "\n", encoding="utf-8")
             self._file.publish()
-            print(f"json:      {self._path}")
+            print(f"json:      {self._file.path}")
 
 
 def plain(value: Any) -> Any:

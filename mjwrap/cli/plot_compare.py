@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from mjwrap.cli.compare_files import TITLES
-from mjwrap.cli.output import Output
 from mjwrap.cli.plot_run import save
 from mjwrap.comparison import AGREE, MotionDifference, MuscleSummary, Outcome, PoseComparison
+from mjwrap.output import PartFile
 
 COLOURS = {
     Outcome.AGREE: "#4c9f70",
@@ -30,7 +30,7 @@ SWEEPS = 5  # muscles whose sweeps are shown
 
 
 def plot_comparison(
-    output: Output, title: str, found: PoseComparison, motion: MotionDifference | None
+    output: PartFile, title: str, found: PoseComparison, motion: MotionDifference | None
 ) -> None:
     """Draw a comparison and give the file its name."""
     shown = _telling(found)

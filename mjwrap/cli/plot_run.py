@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
 from mjwrap.cli.history import History
-from mjwrap.cli.output import Output
 from mjwrap.mjcf import name_of
+from mjwrap.output import PartFile
 
 Array = NDArray[np.float64]
 LINES = 12  # more curves than this in one panel cannot be told apart
@@ -21,7 +21,7 @@ _STYLES = ("-", "--", ":")
 
 
 def plot_run(
-    output: Output, title: str, model: mujoco.MjModel, muscles: MuscleSystem, history: History
+    output: PartFile, title: str, model: mujoco.MjModel, muscles: MuscleSystem, history: History
 ) -> None:
     """Draw a run and give the file its name."""
     many = muscles.n > LINES
@@ -53,7 +53,7 @@ def plot_run(
     save(figure, output)
 
 
-def save(figure: Any, output: Output) -> None:
+def save(figure: Any, output: PartFile) -> None:
     """Write a figure and give the file its name."""
     with output.writing():
         figure.savefig(output.part, dpi=110)

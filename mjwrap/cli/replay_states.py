@@ -9,7 +9,7 @@ import numpy as np
 
 from mjwrap import MuscleSystem, Recorder, read_table
 from mjwrap.cli.models import load, start_keyframe, start_state
-from mjwrap.cli.output import Output, Report
+from mjwrap.cli.output import Report, open_output, opened
 from mjwrap.cli.progress import Interrupt, progress_bar
 from mjwrap.cli.samples import Samples, choose_kinds
 from mjwrap.cli.states import read_states
@@ -27,9 +27,11 @@ def recompute(options: argparse.Namespace, recording: str | None) -> None:
     with contextlib.ExitStack() as stack:
         samples = None
         if options.out:
-            output = Output(options.out, "--out", SUFFIXES)
+            output = open_output(options.out, "--out", *SUFFIXES)
             samples = Samples(output, model, muscles, choose_kinds(options.columns))
-        recorder = stack.enter_context(Recorder(model, muscles, recording)) if recording else None
+        recorder = None
+        if recording:
+            recorder = stack.enter_context(opened(lambda: Recorder(model, muscles, recording)))
         bar = progress_bar(len(states.time), "states", "computing paths")
         with Interrupt() as interrupt, contextlib.closing(bar):
             for k in range(len(states.time)):

@@ -27,7 +27,6 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 import mujoco
 
@@ -37,16 +36,14 @@ from mjwrap.cli.engine import MODES, Engine, PluginEngine, start_engine
 from mjwrap.cli.errors import INTERRUPTED, UserError
 from mjwrap.cli.history import History
 from mjwrap.cli.models import INTEGRATORS, set_state, start_keyframe
-from mjwrap.cli.output import Output, Report, add_json
+from mjwrap.cli.output import Report, add_json, open_output, opened
 from mjwrap.cli.prescribe import Prescribed, check_free
 from mjwrap.cli.progress import Interrupt, need_matplotlib, progress_bar
 from mjwrap.cli.samples import KINDS, USUAL, Samples, choose_kinds
-from mjwrap.errors import RecordingError
 from mjwrap.excitation import Excitation
 from mjwrap.files import SUFFIXES
 
 Log = Callable[[mujoco.MjData], object]
-Kept = TypeVar("Kept")
 OUTPUTS = (("recording", "record"), ("video", "video"), ("plot", "plot"), ("csv", "csv"), ("table", "out"))
 
 
@@ -153,9 +150,9 @@ def open_outputs(
     logs: list[Log] = []
     closes: list[Callable[[], None]] = []
     kinds = choose_kinds(options.columns)
-    plot = Output(options.plot, "--plot", (".png", ".pdf", ".svg")) if options.plot else None
-    tables = [Output(options.csv, "--csv", (".csv",))] if options.csv else []
-    tables += [Output(options.out, "--out", SUFFIXES)] if options.out else []
+    plot = open_output(options.plot, "--plot", ".png", ".pdf", ".svg") if options.plot else None
+    tables = [open_output(options.csv, "--csv", ".csv")] if options.csv else []
+    tables += [open_output(options.out, "--out", *SUFFIXES)] if options.out else []
     if plot is not None:
         need_matplotlib()
     for output in tables:
@@ -188,14 +185,6 @@ def open_outputs(
 
         closes.append(draw)
     return logs, closes
-
-
-def opened(make: Callable[[], Kept]) -> Kept:
-    """Return a recording or film that has been begun; what is wrong with its place is the user's to mend."""
-    try:
-        return make()
-    except RecordingError as error:
-        raise UserError(str(error)) from None
 
 
 def advance(

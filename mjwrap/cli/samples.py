@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem, Table
 from mjwrap.cli.errors import UserError
-from mjwrap.cli.output import Output
 from mjwrap.excitation import control_names
 from mjwrap.files import RowWriter
 from mjwrap.files.writing import save_npz
 from mjwrap.mjcf import MuscleDeclaration, act_names, dof_names, qpos_names
+from mjwrap.output import PartFile
 
 Array = NDArray[np.float64]
 MUSCLE_KINDS = ("activation", "fiber_length", "length", "velocity", "tension")
@@ -94,7 +94,7 @@ class Samples:
     """Writes a row for every sample: text as the run goes on, so that a long run needs no memory; NPZ at the end."""
 
     def __init__(
-        self, output: Output, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Sequence[str]
+        self, output: PartFile, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Sequence[str]
     ) -> None:
         self._output = output
         self._columns = columns(model, muscles, kinds)

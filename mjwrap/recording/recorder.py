@@ -3,16 +3,13 @@
 import math
 import os
 import time
-import warnings
-import weakref
-from collections.abc import Callable, Iterable, Mapping
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mjwrap.errors import RecordingError
-from mjwrap.output import PartFile, require, uninterrupted
+from mjwrap.output import PartFile, RunLog, require
 
 if TYPE_CHECKING:
     from mjwrap.recording.scene import Scene
@@ -24,7 +21,7 @@ BUFFERED = 80_000  # states of a muscle that are gathered unless the caller says
 LIVE = 0.2  # seconds by the clock between two batches to a running viewer
 
 
-class Recorder:
+class Recorder(RunLog):
     """Record a simulation for rerun: the moving model, muscle paths coloured by activation, forces, and time series.
 
     `model` is a mujoco.MjModel; `muscles` its MuscleSystem, or `mjwrap.plugin.Muscles` of the data that a model with
@@ -68,22 +65,20 @@ class Recorder:
         require("spacing", spacing, spacing is None or 0 < spacing < math.inf, "a positive length in metres")
         if path is None and not connect:
             raise RecordingError("there is nowhere to record to: give a file name, or connect=True, or both")
-        self._ended = ""  # why no more can be logged
-        self._target = None if path is None else PartFile(path, SUFFIX)
+        target = None if path is None else PartFile(path, SUFFIX)
         self._live, self._batch_due = bool(connect), -math.inf
         try:
-            scene, self._stream = _open(model, muscles, self._target, connect, groups)
+            scene, self._stream = _open(model, muscles, target, connect, groups)
         except BaseException:
-            if self._target:
-                self._target.discard()
+            if target:
+                target.discard()
             raise
         from mjwrap.recording.frames import Buffers, Options
 
         rows = flush_every or int(np.clip(BUFFERED // max(1, muscles.n), 250, 4000))
         self._buffers = Buffers(scene, muscles, rows, Options(rate, path_rate, spacing, force_scale))
-        self._place = str(connect if self._target is None else self._target.path)
         self._laid_out = False
-        self._finalizer = weakref.finalize(self, _forgotten, self._place, self._target, self._stream)
+        self._begin(str(connect if target is None else target.path), target, self._stream.abandon)
 
     def log(self, data: Any) -> None:
         """Record the state that `muscles` last saw, where one is due; `data` is the mujoco.MjData that it belongs to.
@@ -99,25 +94,6 @@ class Recorder:
         if (added and self._buffers.full) or (self._live and time.perf_counter() >= self._batch_due):
             self._guarded(self._flush)
 
-    def close(self) -> None:
-        """Write what is left, check that the file is complete and give it its name; a second call does nothing.
-
-        Raises RecordingError, and leaves nothing behind, where the disk is full.
-        """
-        if not self._ended:
-            self._guarded(self._finish)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is not None and issubclass(kind, Exception):
-            self._discard("the run ended with an error and nothing was kept")
-        else:
-            self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is a recording
-
     def _lay_out(self) -> None:
         if not self._laid_out:
             self._buffers.lay_out(self._stream)
@@ -131,28 +107,6 @@ class Recorder:
         self._lay_out()
         self._flush()
         self._stream.finish()
-        if self._target:
-            self._target.publish()
-        self._ended = "it is closed"
-        self._finalizer.detach()
-
-    def _guarded(self, action: Callable[[], None]) -> None:
-        """Act whole or not at all: Ctrl-C waits for the end, an error removes the file."""
-        with uninterrupted():
-            try:
-                action()
-            except BaseException as error:
-                self._discard(f"it failed before ({error})")
-                raise
-
-    def _discard(self, why: str) -> None:
-        if self._ended:
-            return
-        self._ended = why
-        self._finalizer.detach()
-        self._stream.abandon()
-        if self._target:
-            self._target.discard()
 
 
 def _open(
@@ -179,14 +133,3 @@ def _open(
         stream.abandon()
         raise
     return scene, stream
-
-
-def _forgotten(place: str, target: PartFile | None, stream: "Stream") -> None:
-    stream.abandon()
-    if target:
-        target.discard()
-    warnings.warn(
-        f"the Recorder of '{place}' was never closed, so nothing was kept; use it in a with statement",
-        RuntimeWarning,
-        stacklevel=2,
-    )

@@ -5,23 +5,18 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import warnings
-import weakref
-from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 import mujoco
 
 from mjwrap.errors import RecordingError
-from mjwrap.output import PartFile, require, uninterrupted
+from mjwrap.output import PartFile, RunLog, require
 from mjwrap.video.formats import FORMATS, Writer
 from mjwrap.video.offscreen import Offscreen
 
 EARLY = 1e-6  # part of a frame's period by which it may come too early, for times that are not exact
 
 
-class Video:
+class Video(RunLog):
     """Film a simulation: what MuJoCo's renderer shows of it, as an .mp4 or .gif.
 
     `model` is a mujoco.MjModel; the muscles of one that `install` or `load` returned are in the picture. `path` is a
@@ -57,18 +52,20 @@ class Video:
         self._camera, self._option = _camera(model, camera), option or mujoco.MjvOption()
         self._signature = model.signature
         self._rate = fps / speed  # frames per simulated second
-        self._ended = ""  # why no more can be logged
         self._start: float | None = None  # time of the first frame
         self._number, self._last_time = -1, -math.inf  # of the last frame, of the last call
-        self._target = PartFile(path, *FORMATS)
+        target = PartFile(path, *FORMATS)
         size = int(width), int(height)
         with contextlib.ExitStack() as undo:
-            undo.callback(self._target.discard)
-            self._writer: Writer = FORMATS[self._target.path.suffix](self._target.part, fps, *size)
+            undo.callback(target.discard)
+            self._writer: Writer = FORMATS[target.path.suffix.lower()](target.part, fps, *size)
             undo.callback(self._writer.abandon)
             self._canvas = Offscreen(model, *size)
             undo.pop_all()
-        self._finalizer = weakref.finalize(self, _forgotten, self._target, self._writer)
+        release = contextlib.ExitStack()
+        release.callback(self._canvas.close)
+        release.callback(self._writer.abandon)
+        self._begin(str(target.path), target, release.close)
 
     def log(self, data: mujoco.MjData) -> None:
         """Add the state of `data` to the film where a frame is due.
@@ -78,9 +75,9 @@ class Video:
         after `close`.
         """
         if self._ended:
-            raise RecordingError(f"cannot log to '{self._target.path}': {self._ended}")
+            raise RecordingError(f"cannot log to '{self._place}': {self._ended}")
         if data.signature != self._signature:
-            raise RecordingError(f"cannot log to '{self._target.path}': this mjData belongs to another model")
+            raise RecordingError(f"cannot log to '{self._place}': this mjData belongs to another model")
         time = float(data.time)
         if not time >= self._last_time:
             raise RecordingError(
@@ -97,54 +94,11 @@ class Video:
                 lambda: self._writer.add(self._canvas.picture(data, self._camera, self._option), number)
             )
 
-    def close(self) -> None:
-        """Write what is left and give the file its name; a second call does nothing.
-
-        Raises RecordingError, and leaves nothing behind, where the disk is full or nothing was logged.
-        """
-        if not self._ended:
-            self._guarded(self._finish)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is not None and issubclass(kind, Exception):
-            self._discard("the run ended with an error and nothing was kept")
-        else:
-            self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is a film
-
     def _finish(self) -> None:
         if self._number < 0:
-            raise RecordingError(f"nothing was logged to '{self._target.path}', so there is no film")
+            raise RecordingError(f"nothing was logged to '{self._place}', so there is no film")
         self._writer.finish(self._number + 1)
-        self._target.publish()
-        self._ended = "it is closed"
-        self._finalizer.detach()
         self._canvas.close()
-
-    def _guarded(self, action: Callable[[], None]) -> None:
-        """Act whole or not at all: Ctrl-C waits for the end, an error removes the file."""
-        with uninterrupted():
-            try:
-                action()
-            except BaseException as error:
-                self._discard(f"it failed before ({error})")
-                if isinstance(error, OSError) and not isinstance(error, RecordingError):
-                    raise self._target.failure(error) from error
-                raise
-
-    def _discard(self, why: str) -> None:
-        if self._ended:
-            return
-        self._ended = why
-        self._finalizer.detach()
-        with contextlib.suppress(Exception):  # nothing is kept, whatever the rest of it says
-            self._writer.abandon()
-        self._canvas.close()
-        self._target.discard()
 
 
 def _camera(model: mujoco.MjModel, camera: str | int | mujoco.MjvCamera | None) -> mujoco.MjvCamera:
@@ -161,14 +115,3 @@ def _camera(model: mujoco.MjModel, camera: str | int | mujoco.MjvCamera | None) 
         raise RecordingError(f"no camera {camera!r}; cameras: {', '.join(names) or 'none'}")
     found.type, found.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), int(number)
     return found
-
-
-def _forgotten(target: PartFile, writer: Writer) -> None:
-    with contextlib.suppress(Exception):
-        writer.abandon()
-    target.discard()
-    warnings.warn(
-        f"the Video '{target.path}' was never closed, so nothing was kept; use it in a with statement",
-        RuntimeWarning,
-        stacklevel=2,
-    )
