@@ -11,11 +11,15 @@ import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
-
-import numpy as np
+from typing import IO, TYPE_CHECKING, Any, Self
 
 from mjwrap.errors import RecordingError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+# signals that ask a process to end: Ctrl-C, kill, and the terminal that is closed (which Windows does not have)
+STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class PartFile:
@@ -117,6 +121,11 @@ class RunLog:
         self._place, self._target, self._release = place, target, release
         self._finalizer = weakref.finalize(self, _forgotten, type(self).__name__, place, target, release)
 
+    @property
+    def _empty(self) -> bool:
+        """Whether nothing was logged."""
+        raise NotImplementedError
+
     def _finish(self) -> None:
         """Complete the file; it has its name afterwards."""
         raise NotImplementedError
@@ -137,6 +146,8 @@ class RunLog:
     ) -> None:
         if kind is not None and issubclass(kind, Exception):
             self._discard("the run ended with an error and nothing was kept")
+        elif kind is not None and self._empty:
+            self._discard("the run was stopped before anything was logged")
         else:
             self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is kept
 
@@ -182,22 +193,25 @@ def _forgotten(kind: str, place: str, target: PartFile | None, release: Callable
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back until the block is done."""
-    previous = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(previous):
+    """Hold Ctrl-C, and what else a handler in Python is there for, back until the block is done."""
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
+    handlers = {number: signal.getsignal(number) for number in STOPPING}
+    previous = {number: handler for number, handler in handlers.items() if callable(handler)}
     held: list[Any] = []
-    signal.signal(signal.SIGINT, lambda *received: held.append(received))
+    for number in previous:
+        signal.signal(number, lambda *received: held.append(received))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
-    if held:
-        previous(*held[-1])
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+    for received in held:
+        previous[received[0]](*received)
 
 
-def require(name: str, value: object, holds: bool | np.bool_, wanted: str) -> None:
+def require(name: str, value: object, holds: "bool | np.bool_", wanted: str) -> None:
     """Raise RecordingError unless an argument holds."""
     if not holds:
         raise RecordingError(f"{name} must be {wanted}, not {value!r}")

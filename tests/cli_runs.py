@@ -1,5 +1,6 @@
 """Running commands: in this process for speed, or in one of their own where that is what is tested."""
 
+import csv
 import os
 import subprocess
 import sys
@@ -13,6 +14,33 @@ from mjwrap.cli import main
 ROOT = Path(__file__).resolve().parent.parent
 ELBOW = str(ROOT / "models" / "elbow" / "elbow.xml")
 CASE2 = str(ROOT / "models" / "paper_case2" / "paper_case2.xml")
+CART = """
+<mujoco>
+  <option timestep="{h}" integrator="{integrator}"/>
+  <worldbody>
+    <body>
+      <joint name="cart" type="slide" axis="1 0 0"/><geom size=".05" mass="2" contype="0" conaffinity="0"/>
+      <body>
+        <joint name="swing" axis="0 1 0"/>
+        <geom type="sphere" size=".001" pos="0 0 -.5" mass="1" contype="0" conaffinity="0"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+ENTERS = """
+<mujoco>
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <geom name="ball" type="sphere" size=".05" contype="0" conaffinity="0"/>
+    <site name="a" pos="-.1 0 .01"/>
+    <body><joint name="slide" type="slide" axis="1 0 0" damping="1"/>
+      <geom size=".01" pos=".1 0 0" mass="1" contype="0" conaffinity="0"/><site name="b" pos=".1 0 0"/></body>
+  </worldbody>
+  <tendon><spatial name="t"><site site="a"/><geom geom="ball"/><site site="b"/></spatial></tendon>
+  <actuator><muscle name="stuck" tendon="t" lengthrange=".05 .3"/></actuator>
+</mujoco>
+"""
 
 
 class Ran(NamedTuple):
@@ -63,3 +91,16 @@ def finish(process: "subprocess.Popen[str]") -> Ran:
 def said(ran: Ran) -> list[str]:
     """Return the lines of standard error, without the one that says that kernels are compiled."""
     return [line for line in ran.err.splitlines() if "compiling its kernels" not in line]
+
+
+def rows_of(path: Path) -> list[dict[str, float]]:
+    with path.open(newline="") as file:
+        return [{name: float(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+
+
+def simulate(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
+    return run_here("run", capsys, *arguments)
+
+
+def only_files(folder: Path, *names: str) -> None:
+    assert sorted(path.name for path in folder.iterdir()) == sorted(names)

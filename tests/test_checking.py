@@ -5,8 +5,7 @@ from typing import Any
 
 import mujoco
 import pytest
-from cli_runs import CASE2, ELBOW, ROOT
-from test_cli_run import ENTERS
+from cli_runs import CASE2, ELBOW, ENTERS, ROOT
 
 import mjwrap as mw
 from mjwrap.checking import Checks, check_model

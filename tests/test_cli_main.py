@@ -7,8 +7,7 @@ from pathlib import Path
 
 import mujoco
 import pytest
-from cli_runs import CASE2, ELBOW, ROOT, Ran, environment, finish, run_here, said, start
-from test_cli_run import ENTERS
+from cli_runs import CASE2, ELBOW, ENTERS, ROOT, Ran, environment, finish, run_here, said, start
 
 from mjwrap.cli import main
 from mjwrap.cli.main import COMMANDS

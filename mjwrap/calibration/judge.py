@@ -20,6 +20,7 @@ from mjwrap.mjcf import name_of
 from mjwrap.mjcf.actuators import mujoco_law
 from mjwrap.muscles import Law, MuJoCoMuscle, PathActuator
 from mjwrap.system import MuscleSystem
+from mjwrap.wording import counted
 
 Found = Iterator[tuple[Implausible, float, float, str]]
 
@@ -156,7 +157,7 @@ def _remarks(known: LengthRange | None) -> tuple[str, ...]:
     failed = sum(known.without_path.values())
     if failed:
         why = ", ".join(f"{name} {count}" for name, count in known.without_path.items())
-        told.append(f"no path at {failed} of {known.poses} poses ({why})")
+        told.append(f"no path at {failed} of {counted(known.poses, 'pose')} ({why})")
     if known.held:
         told.append(f"held still, for want of a range: {', '.join(known.held)}")
     return tuple(told)

@@ -12,6 +12,7 @@ from mjwrap.checking.outcome import Check
 from mjwrap.errors import ModelError, StateError
 from mjwrap.poses import read_couplings
 from mjwrap.system import MuscleSystem
+from mjwrap.wording import counted
 
 Array = NDArray[np.float64]
 SECONDS, ACTIVATION, LIMIT = 0.1, 0.1, 1e-6
@@ -75,7 +76,7 @@ def _drift(model: mujoco.MjModel, qpos: Array, timestep: float) -> tuple[float, 
     elastic = [m.name for m in muscles.declarations if m.parameters.states == 2]
     if elastic:
         raise ModelError(
-            f"{len(elastic)} muscles have elastic tendons, whose steps are implicit ('{elastic[0]}')"
+            f"elastic tendons, whose steps are implicit, in {counted(len(elastic), 'muscle')} ('{elastic[0]}')"
         )
     taken = [m.actuator for m in muscles.declarations if m.actuator >= 0]
     others = np.setdiff1d(np.arange(model.nactuator), taken)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.wording import counted
+
 Array = NDArray[np.float64]
 
 
@@ -75,7 +77,7 @@ class Checks:
             if check.verdict == "skip":
                 told = f"not judged: {check.reason}"
             elif check.limit == 0.0:
-                told = f"{check.worst:.0f}{unit}, of {check.count}"
+                told = counted(check.worst, check.unit.removesuffix("s"))
             else:
                 told = f"{check.worst:.1e}{unit}, limit {check.limit:.0e}"
                 told += f"  ({check.where})" if check.where else ""

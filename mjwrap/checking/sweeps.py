@@ -14,6 +14,7 @@ from mjwrap.continuity import NARROW, odd_intervals, refine_jump
 from mjwrap.paths import Status
 from mjwrap.poses import PoseMaker
 from mjwrap.system import MuscleSystem
+from mjwrap.wording import counted
 
 Array = NDArray[np.float64]
 Place = Callable[[float], tuple[Array, Array]]  # where a joint is -> pose (nq,), its derivative (nv,)
@@ -26,8 +27,8 @@ class Paths:
 
     def __init__(self) -> None:
         self.tangency = Check("tangency", "tangency error", 1e-10)
-        self.found = Check("paths", "a path is found where the model allows one", 0.0, "without")
-        self.inside = Check("model", "the model allows a path at every pose", 0.0, "without")
+        self.found = Check("paths", "a path is found where the model allows one", 0.0, "missing paths")
+        self.inside = Check("model", "the model allows a path at every pose", 0.0, "missing paths")
         self._without: dict[Status, dict[str, list[str]]] = {}
         self.poses = 0
 
@@ -50,7 +51,7 @@ class Paths:
             check = self.inside if kind in MODELS else self.found
             for name, places in sorted(muscles.items(), key=lambda item: -len(item[1])):
                 check.remarks.append(
-                    f"{name}: no path at {len(places)} of {self.poses} poses; at {places[0]}"
+                    f"{name}: no path at {len(places)} of {counted(self.poses, 'pose')}; at {places[0]}"
                 )
         return [self.found, self.inside, self.tangency]
 

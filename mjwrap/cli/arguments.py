@@ -1,10 +1,18 @@
-"""Kinds of arguments, for argparse: numbers within limits."""
+"""Arguments that several commands take, and kinds of arguments: numbers within limits."""
 
 from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable
+
+
+def add_model(parser: argparse.ArgumentParser, keyframe: str, seed: str) -> None:
+    """Add MODEL, --keyframe and --seed; keyframe: what the pose of the keyframe is for, seed: of what."""
+    add = parser.add_argument
+    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
+    add("--keyframe", metavar="NAME", help=f"{keyframe} (default: the model's own)")
+    add("--seed", type=at_least(0), default=0, metavar="N", help=f"{seed} (default %(default)s)")
 
 
 def positive(text: str) -> float:
@@ -49,3 +57,11 @@ def pixels(text: str) -> tuple[int, int]:
     if not (width.isdigit() and height.isdigit() and all(1 <= int(x) <= 16384 for x in (width, height))):
         raise argparse.ArgumentTypeError(f"'{text}' is no size in pixels; write it like 640x480")
     return int(width), int(height)
+
+
+def port(text: str) -> int:
+    """Return a port that has a next one, for argparse."""
+    number = at_least(1)(text)
+    if number >= 65535:
+        raise argparse.ArgumentTypeError(f"{text} must lie between 1 and 65534")
+    return number

@@ -19,21 +19,20 @@ import argparse
 import contextlib
 
 from mjwrap.checking import check_model
-from mjwrap.cli.arguments import at_least
+from mjwrap.cli.arguments import add_model, at_least
 from mjwrap.cli.errors import FAULTS
 from mjwrap.cli.models import load, start_keyframe, start_state
 from mjwrap.cli.output import Report, add_json
 from mjwrap.cli.progress import Stages
+from mjwrap.wording import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say which arguments there are."""
+    add_model(parser, "pose to sweep around", "of the random poses")
     add = parser.add_argument
-    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
-    add("--keyframe", metavar="NAME", help="pose to sweep around (default: the model's own)")
     add("--poses", type=at_least(1), default=20, metavar="N", help="random poses (%(default)s)")
     add("--samples", type=at_least(3), default=101, metavar="N", help="poses of a sweep (%(default)s)")
-    add("--seed", type=at_least(0), default=0, metavar="N", help="of the random poses (%(default)s)")
     add_json(parser, "verdicts and figures")
 
 
@@ -52,14 +51,13 @@ def execute(options: argparse.Namespace) -> int:
             progress=progress,
         )
     facts = found.facts
-    muscles = f"{facts['muscles']} muscle{'s' * (facts['muscles'] != 1)}"
-    sweeps = f"{facts['sweeps']} sweep{'s' * (facts['sweeps'] != 1)}"
+    drawn, sweeps = counted(facts["random_poses"], "random pose"), counted(facts["sweeps"], "sweep")
     if coupled := facts["joints_that_follow"]:
-        sweeps += f" ({coupled} coupled joint{'s follow' if coupled > 1 else ' follows'})"
-    poses = f"{facts['random_poses']} random poses and {sweeps} of {facts['poses_of_a_sweep']} poses"
-    report.say(f"{options.model}: {muscles} at {poses}")
+        sweeps += f" ({counted(coupled, 'coupled joint')} moved along)"
+    poses = f"{drawn} and {sweeps} of {counted(facts['poses_of_a_sweep'], 'pose')}"
+    report.say(f"{options.model}: {counted(facts['muscles'], 'muscle')} at {poses}")
     report.say(found.table())
     failed = len(found.failed)
-    report.say(f"{failed} of {len(found.checks)} checks failed" if failed else "no check failed")
+    report.say(f"{failed} of {counted(len(found.checks), 'check')} failed" if failed else "no check failed")
     report.finish({"model": options.model, **found.as_dict()})
     return FAULTS if failed else 0

@@ -25,7 +25,7 @@ from typing import Any
 import mujoco
 
 from mjwrap import MuscleSystem, Table, read_table
-from mjwrap.cli.arguments import at_least, not_negative
+from mjwrap.cli.arguments import add_model, at_least, not_negative
 from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_poses, tell_tables
 from mjwrap.cli.errors import FAULTS, UserError
 from mjwrap.cli.models import load, start_keyframe, start_state
@@ -41,12 +41,13 @@ from mjwrap.comparison import (
     with_native_laws,
 )
 from mjwrap.excitation import Excitation
+from mjwrap.wording import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say which arguments there are."""
+    add_model(parser, "start pose", "of all that is random")
     add = parser.add_argument
-    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
     add("--muscles", nargs="+", metavar="NAME", help="only these (* and ? stand for anything)")
     add(
         "--samples",
@@ -62,14 +63,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="further poses to sweep around (%(default)s)",
     )
-    add(
-        "--seed",
-        type=at_least(0),
-        default=0,
-        metavar="N",
-        help="of all that is random (%(default)s)",
-    )
-    add("--keyframe", metavar="NAME", help="start pose (default: the model's own)")
     add(
         "--duration", type=not_negative, default=1.0, metavar="S", help="of the motion; 0: none (%(default)s)"
     )
@@ -120,8 +113,9 @@ def execute(options: argparse.Namespace) -> int:
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
         for name, summary in found.muscles.items()
     }
-    count = len(found.muscles)
-    report.say(f"{options.model}: {count} muscle{'s' * (count != 1)} at {found.poses} poses each")
+    report.say(
+        f"{options.model}: {counted(len(found.muscles), 'muscle')} at {counted(found.poses, 'pose')} each"
+    )
     tell_poses(report.say, found, verdicts)
     if rows is not None:
         rows.close()

@@ -24,6 +24,7 @@ from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch
 from mjwrap.comparison.verdict import Extreme, differences, outcomes
 from mjwrap.output import PartFile
+from mjwrap.wording import counted
 
 TITLES = {
     Outcome.AGREE: "equal",
@@ -161,10 +162,7 @@ def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries:
     """Say how far the two runs drift apart."""
     say(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
     if changed:
-        s = "s" * (len(changed) != 1)
-        say(
-            f"  {len(changed)} muscle{s} with another law pull by MuJoCo's curves (--law declared: by their own)"
-        )
+        say(f"  {counted(len(changed), 'muscle')} with another law, here by MuJoCo's curves (see --law)")
     dof, gap, when = motion.worst()
     last, final = motion.final()
     say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")

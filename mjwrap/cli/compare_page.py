@@ -28,6 +28,7 @@ from mjwrap.comparison import (
     Verdict,
 )
 from mjwrap.output import PartFile
+from mjwrap.wording import counted
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; }
@@ -118,7 +119,7 @@ def _count(jumps: list[Jump]) -> str:
     """Return how many jumps there are, of how many muscles, and the largest."""
     if not jumps:
         return "0"
-    return f"{len(jumps)} <small>of {len({j.muscle for j in jumps})} muscles, {_largest(jumps)}</small>"
+    return f"{len(jumps)} <small>of {counted(len({j.muscle for j in jumps}), 'muscle')}, {_largest(jumps)}</small>"
 
 
 def _largest(jumps: Sequence[Jump]) -> str:
@@ -207,7 +208,7 @@ def _details(found: PoseComparison, verdicts: dict[str, Verdict]) -> str:
         if differs:
             body.append(_extremes(s))
         right = _RIGHT[verdicts[name].right]
-        told = f"{len(jumps)} jump{'s' * (len(jumps) != 1)}" if jumps else ""
+        told = counted(len(jumps), "jump") if jumps else ""
         head = f"<b>{_text(name)}</b> <span class='dim'>{_text(right)}{', ' + told if told else ''}</span>"
         opened = " open" if differs or jumps else ""
         parts.append(

@@ -11,8 +11,9 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
 
-from mjwrap.cli.errors import INTERRUPTED, RUN_FAILED, USER_ERROR, RunError, UserError
+from mjwrap.cli.errors import RUN_FAILED, USER_ERROR, RunError, UserError
 from mjwrap.cli.output import discard_outputs
+from mjwrap.cli.stopping import Stopped, silence, stoppable
 from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
 
 _INPUTS = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
@@ -35,11 +36,12 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Read the arguments; a model or recording after --json is not the file that JSON goes to."""
+        """Read the arguments; a model or recording after --json or --connect is not the place that these go to."""
         given = list(args or [])
+        optional = {f: a.const for a in self._actions if a.nargs == "?" for f in a.option_strings}
         for i, (word, following) in enumerate(itertools.pairwise(given)):
-            if word == "--json" and (following.lower().endswith(_INPUTS) or following.startswith("myo_sim:")):
-                given[i] = "--json=-"
+            if word in optional and (following.lower().endswith(_INPUTS) or following.startswith("myo_sim:")):
+                given[i] = f"{word}={optional[word]}"
         return super().parse_args(given, namespace)
 
     def error(self, message: str) -> NoReturn:
@@ -50,24 +52,28 @@ class Parser(argparse.ArgumentParser):
 def run(name: str, body: Callable[[], int]) -> int:
     """Run a command's body and return its exit code; errors become one line on standard error and a code.
 
-    2: the user can mend it; 1: the run failed; 130: Ctrl-C. Output files that are not finished are removed.
+    2: the user can mend it; 1: the run failed; 128 and the signal's number where one asked it to end, so 130 for
+    Ctrl-C. Output files that are not finished are removed.
     """
     try:
-        with _quiet(name):
-            return body()
+        with stoppable(), _quiet(name):
+            code = body()
+            sys.stdout.flush()
+            return code
     except (UserError, ModelError, SignalError, GeometryError) as error:
         return _say(name, error, USER_ERROR)
     except (RunError, MjwrapError) as error:
         return _say(name, error, RUN_FAILED)
     except MemoryError:
         return _say(name, "out of memory", RUN_FAILED)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         # Where it came up inside an exec or eval (numba has some), `python -m` would end by the signal, whatever
         # the exit code; the next exec makes it forget that.
         exec("")
-        return _say(name, "stopped by Ctrl-C", INTERRUPTED)
+        stop = error if isinstance(error, Stopped) else Stopped()
+        return _say(name, f"stopped by {stop.name}", stop.code)
     except BrokenPipeError:  # whoever reads standard output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        silence(sys.stdout.fileno())
         return RUN_FAILED
     finally:
         discard_outputs()

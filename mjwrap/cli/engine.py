@@ -10,6 +10,7 @@ from mjwrap import MuscleSystem, Status
 from mjwrap.cli.models import load, load_spec
 from mjwrap.errors import PathError, StateError
 from mjwrap.system.checks import resets
+from mjwrap.wording import counted
 
 MODES = ("python", "wrench", "transmission")
 
@@ -117,7 +118,7 @@ class PluginEngine:
         for name, count, code in zip(held.names, held.failures.tolist(), held.status.tolist(), strict=True):
             if count:
                 why = f"; now {Status(code).message}" if code else ""
-                found[name] = f"{count} step{'s' * (count != 1)} without a path{why}"
+                found[name] = f"{counted(count, 'step')} without a path{why}"
         return found
 
 

@@ -1,6 +1,6 @@
 """What ends a command early, and its exit codes."""
 
-FAULTS, RUN_FAILED, USER_ERROR, INTERRUPTED = 1, 1, 2, 130
+FAULTS, RUN_FAILED, USER_ERROR = 1, 1, 2
 
 
 class UserError(Exception):

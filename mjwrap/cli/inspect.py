@@ -13,21 +13,23 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import copy
 from typing import Any
 
 from mjwrap import MuscleSystem, implausible, length_ranges
-from mjwrap.cli.arguments import at_least
+from mjwrap.calibration.joints import JointSpace
+from mjwrap.cli.arguments import add_model
 from mjwrap.cli.declared import as_values, table
 from mjwrap.cli.errors import FAULTS, UserError
 from mjwrap.cli.models import load, number, start_keyframe, start_state
 from mjwrap.cli.output import Report, add_json
+from mjwrap.wording import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say which arguments there are."""
+    add_model(parser, "rest pose", "of the drawn poses")
     add = parser.add_argument
-    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
-    add("--keyframe", metavar="NAME", help="rest pose (default: the model's own)")
     add(
         "--range",
         nargs="+",
@@ -40,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="judge the parameters and the rest pose only, not the joints' ranges",
     )
-    add("--seed", type=at_least(0), default=0, metavar="N", help="of the drawn poses (%(default)s)")
     add_json(parser, "muscles, native actuators, findings, remarks and length ranges")
     add("--strict", action="store_true", help="exit code 1 where something is implausible")
 
@@ -50,13 +51,15 @@ def execute(options: argparse.Namespace) -> int:
     model = load(options.model)
     rest = start_state(model, start_keyframe(model, options.keyframe)).qpos
     joints = dict(read_range(entry) for entry in options.range)
+    if joints and options.quick:
+        raise UserError("--range is for the joints' ranges, which --quick does not look at")
+    JointSpace(copy.copy(model), rest, joints)  # so that a mistake in a range shows before the work
     report = Report(options.json)
     muscles = MuscleSystem(model)
     if not muscles.names and not muscles.native:
         raise UserError("the model has no muscles: nothing to inspect")
-    s = "s" * (muscles.n != 1)
     report.say(
-        f"{options.model}: {muscles.n} muscle{s} along geodesic paths, {len(muscles.native)} with MuJoCo's own"
+        f"{options.model}: {counted(muscles.n, 'muscle')} along geodesic paths, {len(muscles.native)} with MuJoCo's own"
     )
     report.say(table(model, muscles.declarations))
     for name, reason in muscles.native.items():

@@ -14,6 +14,7 @@ from mjwrap import MuscleSystem
 from mjwrap.cli.history import History
 from mjwrap.mjcf import name_of
 from mjwrap.output import PartFile
+from mjwrap.wording import counted
 
 Array = NDArray[np.float64]
 LINES = 12  # more curves than this in one panel cannot be told apart
@@ -42,7 +43,7 @@ def plot_run(
             _lines(axis, time, {name: 1e3 * x for name, x in slides.items()}, "joints [mm]", many)
         else:
             _muscle_panel(figure, axis, time, panel, muscles, history, many)
-    notes = [f"{left_out} joints that move less are left out"] if left_out else []
+    notes = [f"left out: {counted(left_out, 'joint')} that move less"] if left_out else []
     if muscles.failures.any():
         failed = [name for name, count in zip(muscles.names, muscles.failures, strict=True) if count]
         notes.append(f"paths not found at some steps: {'in red' if many else ', '.join(failed)}")

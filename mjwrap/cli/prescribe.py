@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from mjwrap.cli.errors import UserError
 from mjwrap.cli.models import find_joint, single_joints
 from mjwrap.errors import SignalError
-from mjwrap.files import read_table
+from mjwrap.files import SUFFIXES, read_table
 from mjwrap.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
 
 Array = NDArray[np.float64]
@@ -59,6 +60,12 @@ class Prescribed:
         found: dict[int, SmoothSignal] = {}
         for entry in entries:
             name, equals, pattern = entry.partition("=")
+            if not equals and Path(entry).suffix.lower() not in SUFFIXES:
+                known = ", ".join(single_joints(model)) or "none"
+                raise UserError(
+                    f"--prescribe '{entry}': write JOINT=PATTERN, such as knee=sine:0.5,1, or name a table "
+                    f"({', '.join(SUFFIXES)}); joints: {known}"
+                )
             if equals:
                 found[find_joint(model, name, entry)] = _smooth(name, pattern)
             else:

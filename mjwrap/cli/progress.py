@@ -1,32 +1,12 @@
-"""While a command works: progress bars, Ctrl-C, and what has to be there before it begins."""
+"""While a command works: progress bars, and what has to be there before it begins."""
 
 from __future__ import annotations
 
 import contextlib
-import signal
 import sys
 from typing import Any
 
 from mjwrap.cli.errors import UserError
-
-
-class Interrupt:
-    """Ctrl-C asks a loop to end: look at `asked` once a turn. A second Ctrl-C stops at once."""
-
-    def __init__(self) -> None:
-        self.asked = False
-
-    def __enter__(self) -> Interrupt:
-        self._before = signal.signal(signal.SIGINT, self._handle)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
-
-    def _handle(self, *_: object) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
 
 
 def progress_bar(total: float, unit: str, label: str) -> Any:

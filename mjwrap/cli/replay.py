@@ -24,8 +24,13 @@ from pathlib import Path
 
 from mjwrap.cli.errors import UserError
 from mjwrap.cli.output import Report, add_json
+from mjwrap.cli.recorded import HOW, add_recording, add_serving, check_how, serve_until_stopped
 from mjwrap.errors import RecordingError
+from mjwrap.output import uninterrupted
 from mjwrap.recording import Summary, open_native, read_summary, serve
+from mjwrap.wording import counted
+
+COLUMNS = "length,velocity,tension"  # of a table, unless others are asked for
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,33 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", metavar="FILE", help="recording (.rrd), or table of states (.sto, .mot, .csv, .npz)")
     what = parser.add_mutually_exclusive_group()
-    what.add_argument(
-        "--serve", action="store_true", help="serve it to a browser on this machine until Ctrl-C"
-    )
+    add_serving(parser, what, "serve it")
     what.add_argument("--info", action="store_true", help="say what it holds, and stop")
-    add(
-        "--port",
-        type=port,
-        default=9090,
-        metavar="N",
-        help="where to serve: N and N + 1 (default %(default)s)",
-    )
     states = parser.add_argument_group("for a table of states")
     states.add_argument("--model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
     states.add_argument("--keyframe", metavar="NAME", help="what the table does not name is as there")
-    states.add_argument("--record", metavar="FILE.rrd", help="keep the recording, and open no viewer")
-    states.add_argument("--out", metavar="FILE", help="paths and forces as a table; opens no viewer")
-    states.add_argument("--columns", default="length,velocity,tension", metavar="KINDS", help="what it holds, as "
-        "mjwrap run has it (default %(default)s)")  # fmt: skip
+    add_recording(states, states)
+    states.add_argument("--out", metavar="FILE", help="paths and forces as a table")
+    states.add_argument("--columns", default=COLUMNS, metavar="KINDS", help="what it holds, as mjwrap run has it "
+        "(default %(default)s)")  # fmt: skip
     add_json(parser, "what the file holds")
-
-
-def port(text: str) -> int:
-    """Return a port that has a next one, for argparse."""
-    number = int(text)
-    if not 0 < number < 65535:
-        raise argparse.ArgumentTypeError(f"{text} must lie between 1 and 65534")
-    return number
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -67,9 +55,11 @@ def execute(options: argparse.Namespace) -> int:
     try:
         if Path(options.file).suffix.lower() in (".sto", ".mot", ".csv", ".npz"):
             return replay_states(options)
-        for option in ("model", "keyframe", "record", "out"):
+        for option in ("model", "keyframe", "record", "connect", *HOW, "out"):
             if getattr(options, option):
-                raise UserError(f"--{option} goes with a table of states, and '{options.file}' is none")
+                raise UserError(
+                    f"--{option.replace('_', '-')} goes with a table of states, and '{options.file}' is none"
+                )
         return show(options, options.file)
     except RecordingError as error:
         raise UserError(str(error)) from None
@@ -85,7 +75,10 @@ def show(options: argparse.Namespace, path: str) -> int:
         sys.stdout.flush()
         return 0
     if options.serve or not has_display():
-        return serve_until_stopped(path, options.port)
+        with uninterrupted():
+            server = serve(path, options.port)
+        print(f"open {server.address}\nCtrl-C stops serving", flush=True)
+        return serve_until_stopped(server)
     return open_native(path)
 
 
@@ -97,7 +90,15 @@ def replay_states(options: argparse.Namespace) -> int:
 
     if not options.model:
         raise UserError(f"'{options.file}' is a table of states: --model says of which model")
-    if options.record or options.out or options.info or options.json:
+    if options.columns != COLUMNS and not options.out:
+        raise UserError("--columns says what a table holds: it goes with --out")
+    kept = options.record or options.out or options.connect
+    if kept and options.serve:
+        raise UserError(
+            "--serve shows what is not kept: leave --record, --out and --connect out, or replay the recording"
+        )
+    if kept or options.info or options.json:
+        check_how(options, bool(options.record or options.connect), "--record or --connect")
         recompute(options, options.record)
         return 0
     with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:
@@ -111,7 +112,7 @@ def describe(summary: Summary) -> str:
     lines = [
         f"file      {summary.path} ({summary.path.stat().st_size / 1e6:.1f} MB)",
         f"model     {summary.model}",
-        f"time      {summary.start:g} s to {summary.end:g} s, {summary.states} states",
+        f"time      {summary.start:g} s to {summary.end:g} s, {counted(summary.states, 'state')}",
         f"muscles   {len(summary.muscles)}: {', '.join(summary.muscles)}",
         f"entities  {len(summary.entities)}:",
     ]
@@ -123,16 +124,3 @@ def has_display() -> bool:
     return sys.platform in ("darwin", "win32") or any(
         os.environ.get(v) for v in ("DISPLAY", "WAYLAND_DISPLAY")
     )
-
-
-def serve_until_stopped(path: str, number: int) -> int:
-    """Serve a recording until Ctrl-C or the end of the server."""
-    address, process = serve(path, number)
-    print(f"open {address}\nCtrl-C stops serving", flush=True)
-    try:
-        return process.wait()
-    except KeyboardInterrupt:
-        return 0
-    finally:
-        process.terminate()
-        process.wait()

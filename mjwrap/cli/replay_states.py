@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from collections.abc import Callable
 
+import mujoco
 import numpy as np
 
-from mjwrap import MuscleSystem, Recorder, read_table
+from mjwrap import MuscleSystem, read_table
 from mjwrap.cli.models import load, start_keyframe, start_state
-from mjwrap.cli.output import Report, open_output, opened
-from mjwrap.cli.progress import Interrupt, progress_bar
+from mjwrap.cli.output import Report, open_output
+from mjwrap.cli.progress import progress_bar
+from mjwrap.cli.recorded import open_recorder
 from mjwrap.cli.samples import Samples, choose_kinds
 from mjwrap.cli.states import read_states
+from mjwrap.cli.stopping import Interrupt
 from mjwrap.files import SUFFIXES
+from mjwrap.output import uninterrupted
+from mjwrap.wording import counted
 
 
 def recompute(options: argparse.Namespace, recording: str | None) -> None:
@@ -25,44 +31,54 @@ def recompute(options: argparse.Namespace, recording: str | None) -> None:
     report = Report(options.json)
     failures = np.zeros(muscles.n, dtype=np.int64)
     with contextlib.ExitStack() as stack:
-        samples = None
-        if options.out:
-            output = open_output(options.out, "--out", *SUFFIXES)
-            samples = Samples(output, model, muscles, choose_kinds(options.columns))
-        recorder = None
-        if recording:
-            recorder = stack.enter_context(opened(lambda: Recorder(model, muscles, recording)))
+        with uninterrupted():
+            logs, close = open_outputs(options, model, muscles, recording, stack)
+        states.put(data, 0)
+        muscles.forward(data)  # compiles where that is still to do
         bar = progress_bar(len(states.time), "states", "computing paths")
+        done = 0
         with Interrupt() as interrupt, contextlib.closing(bar):
-            for k in range(len(states.time)):
-                if interrupt.asked:
-                    break
-                states.put(data, k)
+            while done < len(states.time) and not (done and interrupt.asked):
+                states.put(data, done)
                 muscles.forward(data)
                 failures += muscles.status != 0
-                if recorder is not None:
-                    recorder.log(data)
-                if samples is not None:
-                    samples.log(data)
+                for log in logs:
+                    log(data)
+                done += 1
                 bar.update(1)
-        if samples is not None:
-            samples.close()
-    span = f"{states.time[0]:g} s to {states.time[-1]:g} s"
+            close()
+            stack.close()
+    span = f"{states.time[0]:g} s to {states.time[done - 1]:g} s"
     without = {
-        name: f"no path at {count} states; at last {muscles.reason(i)}"
+        name: f"no path at {counted(count, 'state')}; at last {muscles.reason(i)}"
         for i, (name, count) in enumerate(zip(muscles.names, failures.tolist(), strict=True))
         if count
     }
-    report.say(f"{options.file}: {len(states.time)} states of {options.model}, {span}")
+    report.say(f"{options.file}: {counted(done, 'state')} of {options.model}, {span}")
     for line in (*states.remarks, *(f"{name}: {why}" for name, why in without.items())):
         report.say(f"  {line}")
     files = {what: path for what, path in (("recording", options.record), ("table", options.out)) if path}
     for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
     report.finish({
-        "file": options.file, "model": options.model, "muscles": muscles.names, "states": len(states.time),
-        "start": states.time[0], "end": states.time[-1], "remarks": states.remarks, "paths_not_found": without,
+        "file": options.file, "model": options.model, "muscles": muscles.names, "states": done,
+        "start": states.time[0], "end": states.time[done - 1], "remarks": states.remarks, "paths_not_found": without,
         "files": files,
     })  # fmt: skip
     if interrupt.asked:
-        raise KeyboardInterrupt
+        raise interrupt.asked
+
+
+def open_outputs(
+    options: argparse.Namespace, model: mujoco.MjModel, muscles: MuscleSystem, recording: str | None,
+    stack: contextlib.ExitStack,
+) -> tuple[list[Callable[[mujoco.MjData], object]], Callable[[], None]]:  # fmt: skip
+    """Open what was asked for: what to call at each state, and what at the end."""
+    samples = None
+    if options.out:
+        output = open_output(options.out, "--out", *SUFFIXES)
+        samples = Samples(output, model, muscles, choose_kinds(options.columns))
+    logs: list[Callable[[mujoco.MjData], object]] = [samples.log] if samples else []
+    if recording or options.connect:
+        logs.append(open_recorder(options, model, muscles, stack, recording, options.connect or "").log)
+    return logs, samples.close if samples else lambda: None

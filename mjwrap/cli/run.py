@@ -12,6 +12,7 @@ in turns):
 
 Examples:
   mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --record elbow.rrd --plot elbow.png
+  mjwrap run models/elbow/elbow.xml --duration 10 --excitation random --serve
   mjwrap run models/elbow/elbow.xml --excitation controls.sto --out elbow.sto --columns length,tension,moment_arm
   mjwrap run myo_sim:myoarm_r --mode wrench --excitation random:3 'DELT*=constant:0.5' --csv arm.csv --json
   mjwrap run models/five_surfaces/five_surfaces.xml --duration 4 --excitation sine:0.5,0.5,0.5 --video five.mp4
@@ -25,78 +26,76 @@ import contextlib
 import math
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
 
 import mujoco
 
-from mjwrap import Recorder, Status, __version__
-from mjwrap.cli.arguments import at_least, pixels, positive
-from mjwrap.cli.engine import MODES, Engine, PluginEngine, start_engine
-from mjwrap.cli.errors import INTERRUPTED, UserError
-from mjwrap.cli.history import History
+from mjwrap import Status, __version__
+from mjwrap.cli.arguments import add_model, pixels, positive
+from mjwrap.cli.engine import MODES, Engine, start_engine
+from mjwrap.cli.errors import UserError
 from mjwrap.cli.models import INTEGRATORS, set_state, start_keyframe
-from mjwrap.cli.output import Report, add_json, open_output, opened
+from mjwrap.cli.output import Report, add_json, opened
 from mjwrap.cli.prescribe import Prescribed, check_free
-from mjwrap.cli.progress import Interrupt, need_matplotlib, progress_bar
-from mjwrap.cli.samples import KINDS, USUAL, Samples, choose_kinds
+from mjwrap.cli.progress import progress_bar
+from mjwrap.cli.recorded import (
+    add_recording,
+    add_serving,
+    check_how,
+    end,
+    serve_until_stopped,
+)
+from mjwrap.cli.run_outputs import OUTPUTS, Log, open_outputs
+from mjwrap.cli.samples import KINDS, USUAL
+from mjwrap.cli.stopping import Interrupt, Stopped
 from mjwrap.excitation import Excitation
 from mjwrap.files import SUFFIXES
-
-Log = Callable[[mujoco.MjData], object]
-OUTPUTS = (("recording", "record"), ("video", "video"), ("plot", "plot"), ("csv", "csv"), ("table", "out"))
+from mjwrap.output import uninterrupted
+from mjwrap.recording import Server, serve
+from mjwrap.wording import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say which arguments there are."""
+    add_model(parser, "start there", "for the pattern 'random'")
+    several = {"nargs": "+", "action": "extend", "default": []}
     add = parser.add_argument
-    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
     add("--duration", type=positive, default=1.0, metavar="S", help="simulated time (default %(default)s s)")
     add("--timestep", type=positive, metavar="S", help="instead of the model's")
     add("--integrator", choices=INTEGRATORS, type=str.lower, help="instead of the model's")
     add("--mode", metavar="MODE", help="what runs the muscles: python, in steps (default); or the engine plugin, as "
         "mjwrap.install knows it: wrench (default with --video), transmission")  # fmt: skip
-    several = {"nargs": "+", "action": "extend", "default": []}
     add("--excitation", **several, metavar="PATTERN|NAME=PATTERN|FILE", help="see above")
     add("--prescribe", **several, metavar="JOINT=PATTERN|FILE", help="joints that follow a constant, sine or cosine "
         "[rad, m] or the columns of a table, whatever pulls at them")  # fmt: skip
-    add("--keyframe", metavar="NAME", help="start there")
     add("--qpos", **several, metavar="JOINT=VALUE", help="start positions [rad, m]")
-    add(
-        "--seed",
-        type=at_least(0),
-        default=0,
-        metavar="N",
-        help="for the pattern 'random' (default %(default)s)",
-    )
     add("--strict", action="store_true", help="stop where a muscle's path cannot be found")
-    add(
-        "--sample",
-        type=positive,
-        default=0.005,
-        metavar="S",
-        help="time between samples, rounded to whole time steps (default %(default)s s)",
-    )
-    add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
-    add("--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo (mp4, gif)")
-    add("--video-size", type=pixels, default=(640, 480), metavar="WxH", help="of the film (default 640x480)")
-    add("--fps", type=positive, default=30.0, metavar="N", help="frames a second of the film (default 30)")
-    add(
+    add("--sample", type=positive, default=0.005, metavar="S", help="time between samples, rounded to whole time "
+        "steps (default %(default)s s)")  # fmt: skip
+    recording = parser.add_argument_group("recording")
+    places = recording.add_mutually_exclusive_group()
+    add_recording(recording, places)
+    add_serving(recording, places, "show the run")
+    film = parser.add_argument_group("film").add_argument
+    film("--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo (mp4, gif)")
+    film("--video-size", type=pixels, default=(640, 480), metavar="WxH", help="of the film (default 640x480)")
+    film("--fps", type=positive, default=30.0, metavar="N", help="frames a second of the film (default 30)")
+    film(
         "--speed",
         type=positive,
         default=1.0,
         metavar="X",
         help="simulated seconds a second of it (default 1)",
     )
-    add("--camera", metavar="NAME", help="a camera of the model, for the film (default: all of the model)")
-    add(
+    film("--camera", metavar="NAME", help="a camera of the model, for the film (default: all of the model)")
+    files = parser.add_argument_group("plot and tables").add_argument
+    files(
         "--plot",
         metavar="FILE.png",
         help="joints, activations, lengths and tensions over time (png, pdf, svg)",
     )
-    add("--out", metavar="FILE", help=f"table over time, SI units ({', '.join(SUFFIXES)})")
-    add("--csv", metavar="FILE.csv", help="another table, or the only one, as CSV")
-    add("--columns", default=USUAL, metavar="KINDS", help="what the tables hold, of "
+    files("--out", metavar="FILE", help=f"table over time, SI units ({', '.join(SUFFIXES)})")
+    files("--csv", metavar="FILE.csv", help="another table, or the only one, as CSV")
+    files("--columns", default=USUAL, metavar="KINDS", help="what the tables hold, of "
         f"{', '.join(KINDS)} (default {USUAL})")  # fmt: skip
     add_json(parser, "what was run, how fast, and what went wrong")
 
@@ -114,6 +113,8 @@ def execute(options: argparse.Namespace) -> int:
         raise UserError("--camera is for a film: it goes with --video")
     if options.columns != USUAL and not (options.out or options.csv):
         raise UserError("--columns says what a table holds: it goes with --out or --csv")
+    places = (options.record, options.connect, options.serve)
+    check_how(options, any(places), "--record, --connect or --serve")
     engine = start_engine(options.model, options.mode, options.strict)
     for model in {id(m): m for m in (engine.model, engine.muscles.model)}.values():
         if options.timestep is not None:
@@ -126,81 +127,55 @@ def execute(options: argparse.Namespace) -> int:
     check_free(prescribed.joints, options.qpos, engine.model)
     report = Report(options.json)
     with contextlib.ExitStack() as stack:
-        logs, closes = open_outputs(options, engine, stack)
-        with Interrupt() as interrupt:
-            wall = advance(engine, excitation, prescribed, options, logs, interrupt)
-        for close in closes:
-            close()
-    tell(report, options, engine, wall)
-    report.finish(facts(options, engine, wall, interrupt.asked))
-    if interrupt.asked:
-        print("mjwrap run: stopped by Ctrl-C; the files hold what was simulated", file=sys.stderr)
-        return INTERRUPTED
-    return 0
+        server = start_server(options, stack)
+        with contextlib.ExitStack() as outputs:
+            with uninterrupted():
+                logs, closes = open_outputs(options, engine, outputs, server.connect if server else "")
+            begin(engine, excitation, prescribed)
+            with Interrupt() as interrupt:
+                wall = advance(engine, excitation, prescribed, options, logs, interrupt)
+                for close in closes:
+                    close()
+                outputs.close()
+        tell(report, options, engine, wall)
+        report.finish(facts(options, engine, wall, interrupt.asked))
+        if interrupt.asked:
+            name = interrupt.asked.name
+            print(f"mjwrap run: stopped by {name}; the files hold what was simulated", file=sys.stderr)
+            return interrupt.asked.code
+        return serve_until_stopped(server) if server else 0
 
 
-def open_outputs(
-    options: argparse.Namespace, engine: Engine, stack: contextlib.ExitStack
-) -> tuple[list[Log], list[Callable[[], None]]]:
-    """Open every file that was asked for: what to call at each sample, and what at the end.
+def start_server(options: argparse.Namespace, stack: contextlib.ExitStack) -> Server | None:
+    """Start what --serve asks for and say where it is, so that a browser can follow the run."""
+    if not options.serve:
+        return None
+    with uninterrupted():
+        server = opened(lambda: serve(port=options.port))
+        stack.callback(end, server)
+    print(f"mjwrap run: open {server.address}; Ctrl-C stops serving", file=sys.stderr)
+    return server
 
-    A place that cannot be written shows here, before the run. What has to be closed in any case goes on `stack`.
-    """
-    model, muscles = engine.muscles.model, engine.muscles
-    logs: list[Log] = []
-    closes: list[Callable[[], None]] = []
-    kinds = choose_kinds(options.columns)
-    plot = open_output(options.plot, "--plot", ".png", ".pdf", ".svg") if options.plot else None
-    tables = [open_output(options.csv, "--csv", ".csv")] if options.csv else []
-    tables += [open_output(options.out, "--out", *SUFFIXES)] if options.out else []
-    if plot is not None:
-        need_matplotlib()
-    for output in tables:
-        samples = Samples(output, model, muscles, kinds)
-        logs.append(samples.log)
-        closes.append(samples.close)
-    if options.record:
-        logs.append(stack.enter_context(opened(lambda: Recorder(model, muscles, options.record))).log)
-    if isinstance(engine, PluginEngine) and options.video:
-        from mjwrap import Video  # with MuJoCo's renderer
 
-        width, height = options.video_size
-        film = stack.enter_context(
-            opened(
-                lambda: Video(
-                    engine.model, options.video, fps=options.fps, speed=options.speed, width=width,
-                    height=height, camera=options.camera,
-                )
-            )
-        )  # fmt: skip
-        logs.append(lambda _: film.log(engine.fresh()))
-    if plot is not None:
-        history = History(muscles)
-        logs.append(history.log)
-
-        def draw() -> None:
-            from mjwrap.cli.plot_run import plot_run
-
-            plot_run(plot, f"{Path(options.model).name}, {engine.data.time:.4g} s", model, muscles, history)
-
-        closes.append(draw)
-    return logs, closes
+def begin(engine: Engine, excitation: Excitation, prescribed: Prescribed) -> None:
+    """Put the model where it starts; compiles where that is still to do, before the clock starts."""
+    prescribed.place(engine.data)
+    excitation.write(engine.data)
+    engine.look()
+    muscles = engine.muscles
+    inside = [i for i, status in enumerate(muscles.status) if status == Status.ENDPOINT_INSIDE]
+    for i in inside[:1]:
+        raise UserError(f"muscle '{muscles.names[i]}' has no path at the start: {muscles.reason(i)}")
 
 
 def advance(
     engine: Engine, excitation: Excitation, prescribed: Prescribed, options: argparse.Namespace, logs: list[Log],
     interrupt: Interrupt,
 ) -> float:  # fmt: skip
-    """Run for the asked duration or until Ctrl-C; return the wall time [s]."""
-    data, muscles, timestep = engine.data, engine.muscles, float(engine.model.opt.timestep)
+    """Run for the asked duration or until it is to stop; return the wall time [s]."""
+    data, timestep = engine.data, float(engine.model.opt.timestep)
     steps = max(1, math.ceil(options.duration / timestep - 1e-6))
     stride = max(1, round(options.sample / timestep))
-    prescribed.place(data)
-    excitation.write(data)
-    engine.look()  # compiles where that is still to do, before the clock starts
-    inside = [i for i, status in enumerate(muscles.status) if status == Status.ENDPOINT_INSIDE]
-    for i in inside[:1]:
-        raise UserError(f"muscle '{muscles.names[i]}' has no path at the start: {muscles.reason(i)}")
     started = time.perf_counter()
     bar = progress_bar(steps * timestep, "s", "simulating")
     try:
@@ -232,9 +207,9 @@ def sample(engine: Engine, logs: list[Log]) -> None:
 def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: float) -> None:
     """Say what was run, how fast, what went wrong, and where the files are."""
     muscles, simulated = engine.muscles, engine.data.time
-    s, mode = "s" * (muscles.n != 1), "" if options.mode == MODES[0] else f", plugin mode {options.mode}"
+    mode = "" if options.mode == MODES[0] else f", plugin mode {options.mode}"
     step = f"{_integrator(engine.model)}, time step {1e3 * engine.model.opt.timestep:g} ms"
-    report.say(f"{options.model}: {muscles.n} muscle{s}, {step}{mode}")
+    report.say(f"{options.model}: {counted(muscles.n, 'muscle')}, {step}{mode}")
     report.say(
         f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     )
@@ -254,7 +229,9 @@ def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: floa
             report.say(f"{what + ':':10s} {getattr(options, option)}")
 
 
-def facts(options: argparse.Namespace, engine: Engine, wall: float, stopped: bool) -> dict[str, object]:
+def facts(
+    options: argparse.Namespace, engine: Engine, wall: float, stopped: Stopped | None
+) -> dict[str, object]:
     """Return the same as values."""
     return {
         "model": options.model,
@@ -267,7 +244,7 @@ def facts(options: argparse.Namespace, engine: Engine, wall: float, stopped: boo
         "timestep": float(engine.model.opt.timestep),
         "simulated": float(engine.data.time),
         "wall": wall,
-        "stopped_by_ctrl_c": stopped,
+        "stopped_by": stopped.name if stopped else None,
         "paths_not_found": engine.failures(),
         "files": {what: getattr(options, option) for what, option in OUTPUTS if getattr(options, option)},
     }

@@ -15,6 +15,7 @@ from mjwrap.cli.models import single_joints
 from mjwrap.cli.samples import KINDS
 from mjwrap.excitation import control_names
 from mjwrap.mjcf import act_names, dof_names, qpos_names
+from mjwrap.wording import counted
 
 Array = NDArray[np.float64]
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
@@ -114,17 +115,17 @@ class _Reader:
         remarks = []
         left = [name for i, name in enumerate(self.names["qpos"]) if i not in self.found["qpos"]]
         if left:
-            remarks.append(f"{len(left)} positions stay as at the start: {_few(left)}")
+            remarks.append(f"{counted(len(left), 'position')} as at the start: {_few(left)}")
         if not self.found["qvel"]:
             remarks.append("velocities are differences of the positions")
             arrays["qvel"] = _differences(model, time, arrays["qpos"])
         if len(self.found["act"]) < model.na:
             remarks.append(
-                f"{model.na - len(self.found['act'])} of {model.na} activations are not given: as at the start"
+                f"{model.na - len(self.found['act'])} of {counted(model.na, 'activation')} not given: as at the start"
             )
         self.unused = [name for name in self.unused if name.partition(":")[0] not in KINDS]
         if self.unused:
-            remarks.append(f"{len(self.unused)} columns say nothing about the state: {_few(self.unused)}")
+            remarks.append(f"{counted(len(self.unused), 'column')} not about the state: {_few(self.unused)}")
         return States(time, **arrays, remarks=tuple(remarks))
 
 

@@ -25,6 +25,7 @@ from mjwrap.cli.models import load
 from mjwrap.cli.output import Report, add_json
 from mjwrap.errors import VersionError
 from mjwrap.kernels import _jit
+from mjwrap.wording import counted
 
 SCENE = """
 <mujoco>
@@ -90,7 +91,7 @@ def execute(options: argparse.Namespace) -> int:
                 "seconds": seconds,
                 "left_out": left_out,
             }
-            told = left_out or f"{part['compiled']} functions compiled"
+            told = left_out or f"{counted(count.compiled - before, 'function')} compiled"
             report.say(f"{name}: {told}, {seconds:.1f} s")
             parts.append(part)
     finally:

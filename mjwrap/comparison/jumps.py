@@ -13,6 +13,7 @@ from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
 from mjwrap.comparison.verdict import slope
 from mjwrap.continuity import NARROW, Probe, odd_intervals, refine_jump
 from mjwrap.poses import Motion, PoseMaker
+from mjwrap.wording import counted
 
 Array = NDArray[np.float64]
 
@@ -147,7 +148,7 @@ def _sides(
 def _words(record: PathRecord, k: int) -> str:
     """Say what a path is at pose k: which surfaces it touches, and whether it is a true geodesic."""
     touched = int(record.touched[k].sum())
-    text = f"{touched} surface{'s' * (touched != 1)} touched" if touched else "straight"
+    text = f"{counted(touched, 'surface')} touched" if touched else "straight"
     if record.fault[k]:
         return f"{text}, {Fault(int(record.fault[k])).words.format(record.measure[k])}"
     turns = [

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
+from mjwrap.wording import counted
 
 
 class Verdict(NamedTuple):
@@ -74,19 +75,21 @@ def _own_faults(summary: MuscleSummary) -> str:
     failed = summary.counts[Outcome.MJWRAP_FAILED.name]
     if failed:
         reasons = ", ".join(summary.statuses)
-        told.append(f"mjwrap found no path at {failed} poses where MuJoCo's is a true geodesic ({reasons})")
+        told.append(
+            f"mjwrap found no path at {counted(failed, 'pose')} where MuJoCo's is a true geodesic ({reasons})"
+        )
     sides = summary.counts[Outcome.WRONG_SIDE.name]
     if sides:
         told.append(
-            f"at {sides} poses mjwrap starts on the side of the cylinder that is away from its side site"
+            f"at {counted(sides, 'pose')} mjwrap starts on the side of the cylinder that is away from its side site"
         )
     for words, count in summary.own_faults.most_common(3):
-        told.append(f"mjwrap's path is no geodesic at {count} poses: {words}")
+        told.append(f"mjwrap's path is no geodesic at {counted(count, 'pose')}: {words}")
     unexplained = summary.counts[Outcome.UNEXPLAINED.name]
     if unexplained:
         length, velocity, arm = summary.agreement
         told.append(
-            f"at {unexplained} poses both are judged the same geodesic, but differ by up to {length:.0e} m, "
+            f"at {counted(unexplained, 'pose')} both are judged the same geodesic, but differ by up to {length:.0e} m, "
             f"{velocity:.0e} m/s, {arm:.0e} m/rad"
         )
     return "; ".join(told)
@@ -98,8 +101,7 @@ def _jumps(jumps: Sequence[Jump], program: str) -> str:
     if not own:
         return ""
     length, slope = max(abs(jump.length) for jump in own), max(abs(jump.slope) for jump in own)
-    s = "s" * (len(own) != 1)
-    alone = sum(jump.alone for jump in own)
+    alone, often = sum(jump.alone for jump in own), counted(len(own), "time")
     if alone:
-        s += f" ({alone if alone < len(own) else 'all'} with a coupled joint moved alone)"
-    return f"{program} jumps {len(own)} time{s}, by up to {1e3 * length:.3g} mm and {1e3 * slope:.3g} mm/rad"
+        often += f" ({alone if alone < len(own) else 'all'} with a coupled joint moved alone)"
+    return f"{program} jumps {often}, by up to {1e3 * length:.3g} mm and {1e3 * slope:.3g} mm/rad"

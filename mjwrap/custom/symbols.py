@@ -11,6 +11,7 @@ from typing import Any
 
 from mjwrap.custom.source import BUILTINS
 from mjwrap.errors import GeometryError
+from mjwrap.wording import counted
 
 Wanted = Mapping[
     str, tuple[int, str]
@@ -38,7 +39,7 @@ def derive(
     symbols = dict(zip(arguments, sympy.symbols(list(arguments), real=True), strict=True))
     values = _trace(text, entry, list(symbols.values()), what)
     if len(values) != count:
-        raise GeometryError(f"{what} must return {count} number{'s' * (count > 1)}, not {len(values)}")
+        raise GeometryError(f"{what} must return {counted(count, 'number')}, not {len(values)}")
     found = []
     for wanted in groups:
         expressions = [

@@ -11,6 +11,7 @@ from mjwrap.mjcf.actuators import curves_reason, is_muscle, keeps_state, mujoco_
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.surfaces import SIZES
 from mjwrap.muscles import TENDONS, ActuatorForce, DeGrooteFregly2016, Law, Millard2012, PathActuator
+from mjwrap.wording import counted
 
 OBJ = mujoco.mjtObj
 TIMES, SMOOTHING = "activation_time_constants", "activation_smoothing"
@@ -47,9 +48,7 @@ def read_numerics(model: mujoco.MjModel, ids: list[int]) -> Given:
         values = [float(x) for x in model.numeric_data[first : first + int(model.numeric_size[i])]]
         wanted = 2 if fits[0] == TIMES else 1
         if len(values) != wanted:
-            raise ModelError(
-                f"numeric '{name}' must have {wanted} value{'s' * (wanted > 1)}, not {len(values)}"
-            )
+            raise ModelError(f"numeric '{name}' must have {counted(wanted, 'value')}, not {len(values)}")
         given[fits[0]] = values
     return given
 

@@ -15,6 +15,7 @@ import numpy as np
 from mjwrap.errors import GeometryError, ModelError
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Surface, Torus
+from mjwrap.wording import counted
 
 GEOM, NUMERIC = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_NUMERIC
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
@@ -102,7 +103,7 @@ def _declared(model: mujoco.MjModel, name: str, geom: int, numeric: int) -> Surf
     if not sizes.least <= len(values) <= sizes.most:
         least = f"{sizes.least} to " * (sizes.least < sizes.most)
         raise ModelError(
-            f"numeric '{label}' must have {least}{sizes.most} value{'s' * (sizes.most > 1)} [m], {sizes.meaning}, not "
+            f"numeric '{label}' must have {least}{counted(sizes.most, 'value')} [m], {sizes.meaning}, not "
             f"{len(values)}"
         )
     try:

@@ -1,6 +1,6 @@
 """Recordings of a run, for the rerun viewer: `Recorder` writes one, `read_summary` says what one holds."""
 
-from mjwrap.recording.playback import Summary, open_native, read_summary, serve
+from mjwrap.recording.playback import Server, Summary, open_native, read_summary, serve
 from mjwrap.recording.recorder import Recorder
 
-__all__ = ["Recorder", "Summary", "open_native", "read_summary", "serve"]
+__all__ = ["Recorder", "Server", "Summary", "open_native", "read_summary", "serve"]

@@ -6,10 +6,11 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -18,6 +19,10 @@ from mjwrap.errors import RecordingError
 
 if TYPE_CHECKING:
     from rerun.chunk import LazyStore, RrdReader, StoreEntry
+
+
+_HERE = "127.0.0.1"
+_PATIENCE = 60.0  # seconds until a server has to listen
 
 
 @dataclass(frozen=True)
@@ -92,23 +97,53 @@ def open_native(path: str | os.PathLike[str]) -> int:
         process.terminate()
 
 
-def serve(path: str | os.PathLike[str], port: int = 9090) -> tuple[str, subprocess.Popen[bytes]]:
-    """Serve a recording to browsers on this machine; the address to open, and the process that serves it.
+class Server(NamedTuple):
+    """A viewer for browsers: the address to open, where a `Recorder` connects to, and the process that serves."""
 
-    The viewer listens at `port`, the data come from `port + 1`. Raises RecordingError where one is taken.
+    address: str
+    connect: str
+    process: subprocess.Popen[bytes]
+
+
+def serve(path: str | os.PathLike[str] | None = None, port: int = 9090) -> Server:
+    """Serve a recording, or what a `Recorder` sends there, to browsers on this machine; returns once it listens.
+
+    The viewer listens at `port`, the data come from `port + 1`. Raises RecordingError where one is taken, or the
+    server does not start.
     """
-    data_port = port + 1
-    for number in (port, data_port):
+    for number in (port, port + 1):
         try:
             with socket.socket() as probe:
-                probe.bind(("127.0.0.1", number))
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, os.name == "posix")
+                probe.bind((_HERE, number))
         except (OSError, OverflowError) as error:
             raise RecordingError(f"cannot serve at port {number}: {error}; choose another port") from error
-    data = quote(f"rerun+http://127.0.0.1:{data_port}/proxy", safe="")
+    connect = f"rerun+http://{_HERE}:{port + 1}/proxy"
     # the server keeps what it hands out in memory, and drops the oldest beyond its limit
-    limits = ["--bind", "127.0.0.1", "--server-memory-limit", "75%"]
-    ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
-    return f"http://127.0.0.1:{port}?url={data}", _viewer([str(path), "--serve-web", *limits, *ports])
+    limits = ["--bind", _HERE, "--server-memory-limit", "75%"]
+    ports = ["--web-viewer-port", str(port), "--port", str(port + 1)]
+    process = _viewer([*([] if path is None else [str(path)]), "--serve-web", *limits, *ports])
+    try:
+        for number in (port, port + 1):
+            _wait_for(process, number)
+    except BaseException:
+        process.terminate()
+        process.wait()
+        raise
+    return Server(f"http://{_HERE}:{port}?url={quote(connect, safe='')}", connect, process)
+
+
+def _wait_for(process: subprocess.Popen[bytes], port: int) -> None:
+    """Return once a server listens."""
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            socket.create_connection((_HERE, port), timeout=1.0).close()
+            return
+        except OSError as error:
+            if process.poll() is not None or time.monotonic() > deadline:
+                raise RecordingError(f"the server at port {port} does not start: {error}") from error
+            time.sleep(0.02)
 
 
 class _Viewer(subprocess.Popen[bytes]):

@@ -94,6 +94,10 @@ class Recorder(RunLog):
         if (added and self._buffers.full) or (self._live and time.perf_counter() >= self._batch_due):
             self._guarded(self._flush)
 
+    @property
+    def _empty(self) -> bool:
+        return not self._laid_out
+
     def _lay_out(self) -> None:
         if not self._laid_out:
             self._buffers.lay_out(self._stream)

@@ -94,8 +94,12 @@ class Video(RunLog):
                 lambda: self._writer.add(self._canvas.picture(data, self._camera, self._option), number)
             )
 
+    @property
+    def _empty(self) -> bool:
+        return self._number < 0
+
     def _finish(self) -> None:
-        if self._number < 0:
+        if self._empty:
             raise RecordingError(f"nothing was logged to '{self._place}', so there is no film")
         self._writer.finish(self._number + 1)
         self._canvas.close()
