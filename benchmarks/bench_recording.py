@@ -17,25 +17,15 @@ import tempfile
 import time
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjwrap import MuscleSystem, Recorder
+from mjwrap.cli.models import load
 
 ROOT = Path(__file__).resolve().parent.parent
 STEPS_BEFORE = 100
-
-
-def read(source: str) -> mujoco.MjModel:
-    """Load an MJCF file, or a model that the myo_sim package composes."""
-    if not source.startswith("myo_sim:"):
-        return mujoco.MjModel.from_xml_path(source)
-    import myo_sim
-
-    model: Any = myo_sim.load_model(source.removeprefix("myo_sim:"))
-    return model
 
 
 def simulate(
@@ -106,7 +96,7 @@ def main() -> int:
     parser.add_argument("--turns", type=int, default=5, help="runs of each kind (default %(default)s)")
     parser.add_argument("--json", metavar="FILE", help="write the numbers there too")
     options = parser.parse_args()
-    model = read(options.model)
+    model = load(options.model)
     report = measure(model, options.steps, options.turns, options.rate)
     states = f"{options.rate:g} Hz" if options.rate else "at every step"
     print(

@@ -3,7 +3,7 @@
 Prints medians and 95th percentiles of `mjv_updateScene`, which needs no OpenGL, with tendons shown and not shown.
 
     python benchmarks/bench_viewer.py                       # models/elbow
-    python benchmarks/bench_viewer.py myoarm_r myofullbody  # models of the myo-sim package
+    python benchmarks/bench_viewer.py myo_sim:myoarm_r myo_sim:myofullbody
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import mujoco
 import numpy as np
 
 import mjwrap as mw
+from mjwrap.cli.models import load_spec
 
 ELBOW = Path(__file__).resolve().parent.parent / "models" / "elbow" / "elbow.xml"
 STEPS = 50  # of a weakly excited motion, before a scene is filled
@@ -46,20 +47,9 @@ class Scene:
         return 1e6 * (time.perf_counter() - start)
 
 
-def spec_of(source: str) -> mujoco.MjSpec:
-    """Return the MjSpec of a file, or of a model of the myo-sim package."""
-    if Path(source).suffix == ".xml":
-        return mujoco.MjSpec.from_file(source)
-    import myo_sim
-
-    spec: Any = myo_sim.load_spec(source)
-    return spec
-
-
 def measure(source: str, turns: int) -> dict[str, Any]:
     """Fill both scenes in turns."""
-    spec = spec_of(source)
-    scenes = {"native": Scene(spec.compile()), "mjwrap": Scene(mw.install(spec))}
+    scenes = {"native": Scene(load_spec(source).compile()), "mjwrap": Scene(mw.install(load_spec(source)))}
     times = {(kind, shown): [] for kind in scenes for shown in (True, False)}
     for _ in range(turns):
         for (kind, shown), taken in times.items():
@@ -79,7 +69,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("models", nargs="*", default=[str(ELBOW)], help="MJCF files, or names in myo-sim")
+    parser.add_argument("models", nargs="*", default=[str(ELBOW)], help="MJCF files, or myo_sim:NAME")
     parser.add_argument("--turns", type=int, default=300)
     parser.add_argument("--json", type=Path, help="write the results there")
     options = parser.parse_args()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mjwrap as mw
+from mjwrap.cli.models import load_spec
 
 ELBOW = Path(__file__).parents[1] / "models" / "elbow" / "elbow.xml"
 HOME = "our elbow"  # needs no myo_sim
@@ -22,20 +23,11 @@ MODES = ("wrench", "transmission")
 Array = NDArray[np.float64]
 
 
-def myo_sim_spec(name: str) -> mujoco.MjSpec:
-    """Return one of myo_sim's models as a spec."""
-    import myo_sim
-
-    logging.getLogger("mujoco").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Attaching a spec with an empty prefix")
-        return myo_sim.load_spec(name)
-
-
 def spec_of(label: str) -> mujoco.MjSpec:
     """Return a model by its label in the tables, with native muscles only."""
     if label != HOME:
-        return myo_sim_spec(MODELS[label])
+        logging.getLogger("mujoco").setLevel(logging.ERROR)
+        return load_spec(f"myo_sim:{MODELS[label]}")
     spec = mujoco.MjSpec.from_file(str(ELBOW))
     for element in list(spec.tuples):
         spec.delete(element)

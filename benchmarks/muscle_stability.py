@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import mjwrap as mw
+from mjwrap.cli.models import load_spec
 from mjwrap.mjcf.actuators import mujoco_law
 from mjwrap.muscles import MuJoCoMuscle
 
@@ -138,7 +139,7 @@ def alone(name: str, model: mujoco.MjModel, law: str, seconds: float, seed: int)
 
 def whole(name: str, timestep: float, seconds: float, seed: int) -> tuple[str, bool]:
     """Let a model move with all its muscles on elastic tendons; return a line about it, and whether it held."""
-    spec = myo_sim_spec(name)
+    spec = load_spec(f"myo_sim:{name}")
     before = mw.MuscleSystem(spec.compile())
     laws = {m.name: mw.hill_from_mujoco(m.parameters, tendon="elastic").muscle
             for m in before.declarations if isinstance(m.parameters, MuJoCoMuscle)}  # fmt: skip
@@ -166,13 +167,6 @@ def whole(name: str, timestep: float, seconds: float, seed: int) -> tuple[str, b
     return line, bool(finite) and not told
 
 
-def myo_sim_spec(name: str) -> mujoco.MjSpec:
-    """Return one of myo_sim's models as a spec."""
-    import myo_sim
-
-    return myo_sim.load_spec(name)
-
-
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--models", nargs="+", choices=MODELS, default=["elbow", "myofullbody"])
@@ -189,7 +183,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     print("  zigzags  extra  off [F_max]")
     for name in args.models:
-        model = myo_sim_spec(name).compile()
+        model = load_spec(f"myo_sim:{name}").compile()
         for law in args.laws:
             for row in alone(name, model, law, args.seconds, args.seed):
                 rows.append(row)

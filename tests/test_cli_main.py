@@ -135,6 +135,6 @@ def test_warmup_leaves_nothing_to_compile(capsys: pytest.CaptureFixture[str]) ->
     assert Path(first["folder"]) == Path(_jit._CACHE)
     again = json.loads(finish(start("warmup", ELBOW, "--json")).out)
     assert (again["compiled"], again["folder"]) == (0, first["folder"])
-    assert [part["part"] for part in again["parts"]] == ["paths", "muscles", "plugin", ELBOW]
+    assert [part["part"] for part in again["parts"]] == ["paths", "muscles", "plugin", "recording", ELBOW]
     done = finish(start("run", ELBOW, "--duration", "0.01", "--mode", "wrench"))
     assert (done.code, done.err) == (0, "")

@@ -1,4 +1,4 @@
-"""Compile everything now, so that no run has to wait for it: paths, muscles, and the engine plugin inside MuJoCo.
+"""Compile everything now, so that no run has to wait for it: paths, muscles, the engine plugin, recordings.
 
 The machine code is kept for this user, this version of mjwrap and of numba; a second call finds it there. With MODEL,
 the model is evaluated too, with whatever else it asks for.
@@ -11,6 +11,7 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +24,7 @@ from numba.core import event
 import mjwrap as mw
 from mjwrap.cli.models import load
 from mjwrap.cli.output import Report, add_json
-from mjwrap.errors import VersionError
+from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels import _jit
 from mjwrap.wording import counted
 
@@ -76,7 +77,9 @@ def execute(options: argparse.Namespace) -> int:
     model = load(options.model) if options.model else None
     count = _Count()
     event.register("numba:compile", count)
-    steps: dict[str, Callable[[], object]] = {"paths": paths, "muscles": muscles, "plugin": plugin}
+    steps: dict[str, Callable[[], object]] = {
+        "paths": paths, "muscles": muscles, "plugin": plugin, "recording": recording,
+    }  # fmt: skip
     if model is not None:
         steps[options.model] = lambda: evaluate(model)
     parts = []
@@ -104,7 +107,7 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def paths() -> None:
-    """Solve a path and a sweep, and everything that a path is asked for."""
+    """Solve a path and a sweep, also by the paper's methods, and ask a path for everything."""
     row = [mw.Obstacle(mw.Cylinder(0.03), hint=(0.0, 0.03, 0.0)), mw.ViaPoint((-0.06, 0.01, 0.01))]
     ends = (0.1, 0.01, 0.0), (-0.2, 0.0, 0.02)
     path = mw.solve_path(*ends, row)
@@ -113,6 +116,9 @@ def paths() -> None:
     path.points(0.01)
     path.gradient()
     path.stiffness()
+    path.stiffness_times(np.ones((4, 6)))
+    path.contact_velocities((0.1, 0.0, 0.0), (0.0, 0.2, 0.0))
+    mw.solve_path(*ends, row, method="nr")
     places = np.tile([[0.0, 0.0, 0.0], [-0.06, 0.01, 0.01]], (2, 1, 1))
     turns = np.tile([1.0, 0.0, 0.0, 0.0], (2, 2, 1))
     mw.solve_sweep(*ends, row, places, turns)
@@ -132,7 +138,11 @@ def evaluate(model: mujoco.MjModel) -> None:
     mujoco.mj_resetData(model, data)
     system.reset(data)
     system.apply(data)
+    mujoco.mj_step(model, data)
+    system.advance(data)
     system.length_jacobian(data)
+    if system.n:
+        system.forces(0)
     system.polylines()
     system.contacts()
     system.energetics(mw.Umberger2010())
@@ -147,4 +157,18 @@ def plugin() -> str:
     except VersionError as error:
         return f"left out: {error}"
     mujoco.mj_step(model, mujoco.MjData(model))
+    return ""
+
+
+def recording() -> str:
+    """Record a state; return why that cannot be, or an empty string."""
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    system, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:
+        try:
+            with mw.Recorder(model, system, Path(folder) / "warmup.rrd") as recorder:
+                system.step(data)
+                recorder.log(data)
+        except RecordingError as error:
+            return f"left out: {error}"
     return ""
