@@ -220,7 +220,7 @@ def require(name: str, value: object, holds: "bool | np.bool_", wanted: str) -> 
 def _reason(error: OSError, path: Path) -> str:
     """Name the cause of an OSError, and the folder that exists where one is missing."""
     folder = path.absolute().parent
-    if isinstance(error, FileNotFoundError):
+    if isinstance(error, FileNotFoundError) and not folder.exists():
         existing = next(parent for parent in folder.parents if parent.exists())
         return f"there is no folder '{folder}' (the path exists as far as '{existing}')"
     if isinstance(error, NotADirectoryError):

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from mjwrap.cli.errors import RUN_FAILED, USER_ERROR, RunError, UserError
 from mjwrap.cli.output import discard_outputs
-from mjwrap.cli.stopping import Stopped, silence, stoppable
+from mjwrap.cli.stopping import Stopped, stoppable
 from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
 
 _INPUTS = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
@@ -57,9 +57,7 @@ def run(name: str, body: Callable[[], int]) -> int:
     """
     try:
         with stoppable(), _quiet(name):
-            code = body()
-            sys.stdout.flush()
-            return code
+            return body()
     except (UserError, ModelError, SignalError, GeometryError) as error:
         return _say(name, error, USER_ERROR)
     except (RunError, MjwrapError) as error:
@@ -72,9 +70,6 @@ def run(name: str, body: Callable[[], int]) -> int:
         exec("")
         stop = error if isinstance(error, Stopped) else Stopped()
         return _say(name, f"stopped by {stop.name}", stop.code)
-    except BrokenPipeError:  # whoever reads standard output has seen enough
-        silence(sys.stdout.fileno())
-        return RUN_FAILED
     finally:
         discard_outputs()
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib
+import io
+import os
 import sys
 from collections.abc import Sequence
 
 import mjwrap
 from mjwrap.cli import console
-from mjwrap.cli.errors import USER_ERROR
+from mjwrap.cli.errors import RUN_FAILED, USER_ERROR, RunError
+from mjwrap.cli.output import say, written
 
 COMMANDS = {
     "run": "simulate a model with its muscles along geodesic paths",
@@ -34,20 +37,38 @@ Examples:
   mjwrap inspect models/elbow/elbow.xml
   mjwrap check models/elbow/elbow.xml
 
-Exit codes: 0 done, 1 faults found or the run failed, 2 a mistake on the command line or in a file, 130 Ctrl-C.
-"""
+Exit codes: 0 done, 1 faults found or the run failed, 2 a mistake on the command line or in a file, 130 Ctrl-C."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code, as `HELP` lists them."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by the shell
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name that it has no letters for is no error
+    try:
+        try:
+            return _command(given)
+        finally:
+            with written():
+                sys.stdout.flush()
+    except BrokenPipeError:
+        return RUN_FAILED
+    except RunError as error:
+        print(f"mjwrap: {error}", file=sys.stderr)
+        return RUN_FAILED
+
+
+def _command(given: list[str]) -> int:
     first = given[0] if given else "--help"
     if first in ("-h", "--help"):
         lines = (f"  {name:9s} {text}" for name, text in COMMANDS.items())
-        print(HELP.format(commands="\n".join(lines)), end="")
+        say(HELP.format(commands="\n".join(lines)))
         return 0 if given else USER_ERROR
     if first == "--version":
-        print(f"mjwrap {mjwrap.__version__}")
+        say(f"mjwrap {mjwrap.__version__}")
         return 0
     if first not in COMMANDS:
         kind = "option" if first.startswith("-") else "command"

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
-from mjwrap.cli.errors import UserError
+from mjwrap.cli.errors import RunError, UserError
+from mjwrap.cli.stopping import silence
 from mjwrap.errors import RecordingError
-from mjwrap.output import PartFile
+from mjwrap.output import PartFile, uninterrupted
 
 Kept = TypeVar("Kept")
 _files: list[PartFile] = []  # of the command that runs
@@ -18,8 +21,9 @@ _files: list[PartFile] = []  # of the command that runs
 
 def open_output(path: str, option: str, *suffixes: str) -> PartFile:
     """Return a file to be written; what is wrong with its place is the user's to mend, before the run."""
-    file = opened(lambda: PartFile(path, *suffixes, option=option))
-    _files.append(file)
+    with uninterrupted():
+        file = opened(lambda: PartFile(path, *suffixes, option=option))
+        _files.append(file)
     if any(other.path.resolve() == file.path.resolve() for other in _files[:-1]):
         raise UserError(f"{option} '{path}': another output goes to the same file")
     return file
@@ -61,18 +65,42 @@ class Report:
     def say(self, text: str = "") -> None:
         """Print a line of text, unless JSON takes its place."""
         if not self._instead:
-            print(text)
+            say(text)
 
     def finish(self, facts: Mapping[str, Any]) -> None:
         """Write the values, if they were asked for."""
-        text = json.dumps(plain(facts), indent=1, allow_nan=False, ensure_ascii=False)
+        values = plain(facts)
         if self._instead:
-            print(text)
+            unicode = (sys.stdout.encoding or "").lower().startswith("utf")
+            say(json.dumps(values, indent=1, allow_nan=False, ensure_ascii=not unicode))
         elif self._file is not None:
             with self._file.writing():
+                text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
                 self._file.part.write_text(text + "\n", encoding="utf-8")
             self._file.publish()
-            print(f"json:      {self._file.path}")
+            say(f"json:      {self._file.path}")
+
+
+def say(text: str) -> None:
+    """Print at once; where nobody reads it, files that were asked for are still written."""
+    try:
+        with written():
+            print(text, flush=True)
+    except BrokenPipeError:
+        if not _files:
+            raise
+
+
+@contextlib.contextmanager
+def written() -> Iterator[None]:
+    """After an error of standard output let the rest go nowhere; all but a closed pipe is a `RunError`."""
+    try:
+        yield
+    except OSError as error:
+        silence(sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise RunError(f"cannot write to standard output: {(error.strerror or str(error)).lower()}") from None
 
 
 def plain(value: Any) -> Any:

@@ -23,7 +23,7 @@ import tempfile
 from pathlib import Path
 
 from mjwrap.cli.errors import UserError
-from mjwrap.cli.output import Report, add_json
+from mjwrap.cli.output import Report, add_json, say
 from mjwrap.cli.recorded import HOW, add_recording, add_serving, check_how, serve_until_stopped
 from mjwrap.errors import RecordingError
 from mjwrap.output import uninterrupted
@@ -72,12 +72,11 @@ def show(options: argparse.Namespace, path: str) -> int:
         report = Report(options.json)
         report.say(describe(summary))
         report.finish({name: str(x) if isinstance(x, Path) else x for name, x in vars(summary).items()})
-        sys.stdout.flush()
         return 0
     if options.serve or not has_display():
         with uninterrupted():
             server = serve(path, options.port)
-        print(f"open {server.address}\nCtrl-C stops serving", flush=True)
+        say(f"open {server.address}\nCtrl-C stops serving")
         return serve_until_stopped(server)
     return open_native(path)
 
