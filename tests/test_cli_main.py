@@ -1,6 +1,8 @@
 """The command `mjwrap`: help, exit codes, what is loaded, and the commands that have no test file of their own."""
 
 import json
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +25,41 @@ def test_help_names_every_command_and_its_examples(capsys: pytest.CaptureFixture
         assert (ran.code, ran.err) == (0, "")
         assert f"Examples:\n  mjwrap {name}" in ran.out
         assert max(map(len, ran.out.splitlines())) <= 120
+
+
+def examples(capsys: pytest.CaptureFixture[str]) -> list[list[str]]:
+    """Return the examples of all help texts that need no other package, display or file of the user's."""
+    found = []
+    for name in COMMANDS:
+        lines = run_here(name, capsys, "--help").out.splitlines()
+        found += [shlex.split(line)[1:] for line in lines if line.startswith(f"  mjwrap {name}")]
+    other = re.compile(r"myo_sim:|arm\.xml|--serve|replay elbow\.rrd$")
+    return [words for words in found if not other.search(" ".join(words))]
+
+
+def test_the_examples_of_the_help_texts_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One after the other in a folder that has the models, so that one may use what another one left."""
+    pytest.importorskip("PIL", reason="GIFs need Pillow")
+    (tmp_path / "models").symlink_to(ROOT / "models")
+    monkeypatch.chdir(tmp_path)
+    given = examples(capsys)
+    assert {words[0] for words in given} == set(COMMANDS)
+    for words in given:
+        ran = run_here(words[0], capsys, *words[1:])
+        assert ran.code == 0 or "OpenGL" in ran.err, (words, ran.err)
+
+
+def test_help_fits_a_narrow_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    for name in COMMANDS:
+        lines = run_here(name, capsys, "--help").out.splitlines()
+        assert lines[0].startswith(f"usage: mjwrap {name} ")
+        text = [line for line in lines if not line.startswith("  ")]
+        assert max(map(len, text)) <= 60, text
 
 
 def test_a_wrong_command_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ import contextlib
 import itertools
 import os
 import sys
+import textwrap
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
@@ -22,6 +23,22 @@ _MYO_NOISE = (
 )
 
 
+class _Help(argparse.HelpFormatter):
+    """Fills paragraphs to the width of the terminal; what is indented stays as it is."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        found: list[str] = []
+        for block in text.strip().split("\n"):
+            if block and found and found[-1] and not (block[0] == " " or found[-1][0] == " "):
+                found[-1] += f" {block}"
+            else:
+                found.append(block)
+        return "\n".join(
+            line if line.startswith(" ") else textwrap.fill(line, width, break_long_words=False)
+            for line in found
+        )
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, and whose help is a command's documentation, its examples last."""
 
@@ -32,7 +49,7 @@ class Parser(argparse.ArgumentParser):
             description=what,
             epilog=(mark + examples).strip() or None,
             allow_abbrev=False,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=_Help,
         )
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -44,8 +61,17 @@ class Parser(argparse.ArgumentParser):
                 given[i] = f"{word}={optional[word]}"
         return super().parse_args(given, namespace)
 
+    def format_help(self) -> str:
+        """Return the help, in which the first line names what is needed and the list all that is possible."""
+        needed = [a for a in self._actions if not a.option_strings]
+        names = [f"[{a.metavar}]" if a.nargs == "?" else str(a.metavar) for a in needed]
+        self.usage = " ".join([self.prog, *names, "[OPTION ...]"])
+        return super().format_help()
+
     def error(self, message: str) -> NoReturn:
         """Print the message and stop."""
+        if "arguments are required" in message and "--" not in message:
+            message += "; it comes before the options, some of which take all words that follow"
         self.exit(USER_ERROR, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 

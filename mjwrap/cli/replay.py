@@ -10,7 +10,7 @@ Without an option the viewer opens, or where there is no display the recording i
 Examples:
   mjwrap replay elbow.rrd
   mjwrap replay elbow.rrd --info
-  mjwrap replay states.npz --model models/elbow/elbow.xml --record elbow.rrd
+  mjwrap replay elbow.npz --model models/elbow/elbow.xml --record again.rrd
   mjwrap replay ik.mot --model arm.xml --out paths.sto --columns length,moment_arm
 """
 

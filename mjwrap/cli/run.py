@@ -13,10 +13,11 @@ in turns):
 Examples:
   mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --record elbow.rrd --plot elbow.png
   mjwrap run models/elbow/elbow.xml --duration 10 --excitation random --serve
-  mjwrap run models/elbow/elbow.xml --excitation controls.sto --out elbow.sto --columns length,tension,moment_arm
-  mjwrap run myo_sim:myoarm_r --mode wrench --excitation random:3 'DELT*=constant:0.5' --csv arm.csv --json
-  mjwrap run models/five_surfaces/five_surfaces.xml --duration 4 --excitation sine:0.5,0.5,0.5 --video five.mp4
+  mjwrap run models/elbow/elbow.xml --excitation pulses 'BIC*=constant:0.2' --out elbow.npz --columns qpos,ctrl,length
+  mjwrap run models/elbow/elbow.xml --excitation elbow.npz --mode wrench --csv again.csv --json
+  mjwrap run models/five_surfaces/five_surfaces.xml --duration 4 --excitation sine:0.5,0.5,0.5 --video five.gif
   mjwrap run models/paper_case2/paper_case2.xml --duration 3 --prescribe cylinder_y=sine:0.02,1 --csv case2.csv
+  mjwrap run myo_sim:myoarm_r --mode wrench --excitation random:3 'DELT*=constant:0.5' --out arm.sto
 """
 
 from __future__ import annotations
