@@ -55,8 +55,8 @@ class Excitation:
         return list(self._places)
 
     def _read(self, entry: str) -> None:
-        name, equals, pattern = entry.partition("=")
-        if equals:
+        name, equals, pattern = entry.rpartition("=")  # a name may have one, too
+        if equals and not os.path.isfile(entry):
             found = [name] if name in self._places else fnmatch.filter(self.names, name)
             if not found:
                 known = ", ".join(self.names) or "none"

@@ -67,9 +67,9 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: S
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
     for entry in positions:
-        name, equals, text = entry.partition("=")
+        name, equals, text = entry.rpartition("=")
         if not equals:
-            raise UserError(f"--qpos '{entry}': write JOINT=VALUE, such as {name}=0.5 [rad or m]")
+            raise UserError(f"--qpos '{entry}': write JOINT=VALUE, such as {entry}=0.5 [rad or m]")
         joint = find_joint(model, name, entry)
         data.qpos[model.jnt_qposadr[joint]] = number(text, f"'{entry}'")
 

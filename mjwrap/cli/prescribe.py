@@ -59,7 +59,8 @@ class Prescribed:
         self._model = model
         found: dict[int, SmoothSignal] = {}
         for entry in entries:
-            name, equals, pattern = entry.partition("=")
+            name, equals, pattern = entry.rpartition("=")
+            equals = equals and not Path(entry).is_file()
             if not equals and Path(entry).suffix.lower() not in SUFFIXES:
                 known = ", ".join(single_joints(model)) or "none"
                 raise UserError(
@@ -112,5 +113,5 @@ def _smooth(name: str, pattern: str) -> SmoothSignal:
 def check_free(joints: Sequence[int], positions: Sequence[str], model: mujoco.MjModel) -> None:
     """Raise `UserError` where a start position is given for a joint that is prescribed."""
     for entry in positions:
-        if find_joint(model, entry.partition("=")[0], entry) in joints:
+        if find_joint(model, entry.rpartition("=")[0], entry) in joints:
             raise UserError(f"'{entry}': this joint's position is prescribed")

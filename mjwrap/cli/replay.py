@@ -94,7 +94,7 @@ def replay_states(options: argparse.Namespace) -> int:
     kept = options.record or options.out or options.connect
     if kept and options.serve:
         raise UserError(
-            "--serve shows what is not kept: leave --record, --out and --connect out, or replay the recording"
+            "--serve is for what is not kept: leave --record, --connect and --out away, or replay the recording"
         )
     if kept or options.info or options.json:
         check_how(options, bool(options.record or options.connect), "--record or --connect")

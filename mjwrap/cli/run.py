@@ -217,7 +217,7 @@ def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: floa
     if not muscles.n and not muscles.native:
         report.say("the model declares no muscle that mjwrap could drive; only MuJoCo moved it")
     if muscles.native:
-        report.say(f"{len(muscles.native)} stay with MuJoCo's own tendons:")
+        report.say(f"{counted(len(muscles.native), 'actuator')} left to MuJoCo:")
         for name, reason in muscles.native.items():
             report.say(f"  {name}: {reason}")
     failed = engine.failures()

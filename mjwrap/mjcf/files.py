@@ -22,8 +22,12 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
     file = Path(path)
     if not file.is_file():
         folder, what = (file, "is a folder") if file.is_dir() else (file.parent, "does not exist")
+        if not folder.is_dir():
+            raise ModelError(f"model file {file} does not exist, nor does the folder {folder}")
         there = sorted(p.name for p in folder.glob("*") if p.suffix in (".xml", ".mjb"))
         raise ModelError(f"model file {file} {what}; models in {folder}: {listed(there)}")
+    if not os.access(file, os.R_OK):
+        raise ModelError(f"model file {file} cannot be read: permission denied")
     load = mujoco.MjModel.from_binary_path if file.suffix == ".mjb" else mujoco.MjModel.from_xml_path
     with _collected_warnings() as found:
         try:

@@ -46,6 +46,8 @@ def read_summary(path: str | os.PathLike[str]) -> Summary:
     path = Path(path)
     if not path.is_file():
         raise RecordingError(f"there is no recording '{path}'")
+    if not os.access(path, os.R_OK):
+        raise RecordingError(f"cannot read '{path}': permission denied")
     from rerun.chunk import RrdReader
 
     from mjwrap.recording.columns import TIMELINE
