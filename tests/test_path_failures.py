@@ -49,12 +49,21 @@ SCENE = f"""<mujoco><option gravity="0 0 0" timestep="0.002"/>
       <element objtype="numeric" objname="mjwrap_h_optimal_force"/>
     </tuple>
   </custom></mujoco>"""
+# Here it swings along the cylinder, 60 mm long, and the string leaves it beyond its end.
+BEYOND = (
+    SCENE.replace('axis="1 0 0" stiffness', 'axis="0 0 1" stiffness')
+    .replace('<element objtype="geom" objname="cylinder"/>', '<element objtype="geom" objname="cylinder"/> '
+             '<element objtype="numeric" objname="mjwrap_short_cylinder_size"/>')
+    .replace("<custom>", f'<custom><numeric name="mjwrap_short_cylinder_size" data="{RADIUS} 0.03"/>')
+)  # fmt: skip
 EULER, RK4 = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_RK4
 both = pytest.mark.parametrize("integrator", [EULER, RK4])
 
 
-def scene(integrator: int = EULER, strict: bool = False) -> tuple[mujoco.MjData, mw.MuscleSystem, int]:
-    model = mujoco.MjModel.from_xml_string(SCENE)
+def scene(
+    integrator: int = EULER, strict: bool = False, xml: str = SCENE
+) -> tuple[mujoco.MjData, mw.MuscleSystem, int]:
+    model = mujoco.MjModel.from_xml_string(xml)
     model.opt.integrator = int(integrator)
     muscles = mw.MuscleSystem(model, strict=strict)
     muscles.excitation[muscles.index("first")] = 0.5
@@ -65,8 +74,8 @@ def inside(data: mujoco.MjData) -> bool:
     return bool(0.1 + data.qpos[0] < RADIUS)
 
 
-def exact_length(x: float) -> float:
-    path = mw.solve_path((-0.1, -0.005, 0), (x, 0, 0), [mw.Obstacle(mw.Cylinder(RADIUS), hint=(0, 0.05, 0))])
+def exact_length(x: float, z: float = 0.0) -> float:
+    path = mw.solve_path((-0.1, -0.005, 0), (x, 0, z), [mw.Obstacle(mw.Cylinder(RADIUS), hint=(0, 0.05, 0))])
     assert path.contacts[0].P is not None
     assert path.contacts[0].P[1] > 0
     return path.length
@@ -78,28 +87,47 @@ def snapshot(muscles: mw.MuscleSystem, i: int) -> tuple[Vector, Vector]:
     return numbers, np.array([force for _, _, force in muscles.forces(i)])
 
 
-def test_a_muscle_without_a_path_holds_its_last_good_force_and_recovers_on_its_side() -> None:
+def test_a_muscle_whose_end_is_inside_follows_the_surface_and_recovers_on_its_side() -> None:
+    """The surface's nearest point stays where the end went in, and so does the length."""
     data, muscles, i = scene()
-    other = muscles.index("second")
-    held = snapshot(muscles, i)
-    lost, spells, before = 0, 0, False
+    lost, around = 0, exact_length(RADIUS)
     while data.time < 0.9:
         expected_inside = inside(data)
         x = 0.1 + float(data.qpos[0])
         muscles.step(data)
-        now = snapshot(muscles, i)
         assert (muscles.status[i] == mw.Status.ENDPOINT_INSIDE) == expected_inside
+        assert not muscles.held[i]
+        assert muscles.length[i] == pytest.approx(around if expected_inside else exact_length(x), rel=1e-12)
+        assert not expected_inside or abs(muscles.velocity[i]) < 1e-12
+        lost += expected_inside
+        assert muscles.failures[i] == lost
+    assert lost > 20
+
+
+def test_a_muscle_without_a_path_holds_its_last_good_force_and_recovers_on_its_side() -> None:
+    data, muscles, i = scene(xml=BEYOND)
+    other = muscles.index("second")
+    held = snapshot(muscles, i)
+    lost, spells, before = 0, 0, False
+    while data.time < 0.9:
+        z = float(data.qpos[0])
+        muscles.step(data)
+        now, beyond = snapshot(muscles, i), muscles.status[i] != mw.Status.CONVERGED
+        assert beyond or z > -0.07
+        assert not beyond or z < -0.03
         assert muscles.status[other] == mw.Status.CONVERGED
         assert not data.xfrc_applied.any()
-        if expected_inside:
+        assert muscles.held[i] == beyond
+        if beyond:
+            assert muscles.status[i] == mw.Status.OUT_OF_RANGE
             lost, spells = lost + 1, spells + (not before)
             assert np.array_equal(now[0], held[0])
             assert np.array_equal(now[1], held[1])
             assert now[0][2] > 1
         else:
-            assert now[0][0] == pytest.approx(exact_length(x), rel=1e-12)
+            assert now[0][0] == pytest.approx(exact_length(0.1, z), rel=1e-12)
             held = now
-        before = expected_inside
+        before = beyond
         assert muscles.failures[i] == lost
     assert spells == 2
     assert lost > 20
@@ -107,19 +135,19 @@ def test_a_muscle_without_a_path_holds_its_last_good_force_and_recovers_on_its_s
     report = muscles.report()
     assert "first" in report
     assert str(lost) in report
-    assert mw.Status.ENDPOINT_INSIDE.message in report
+    assert mw.Status.OUT_OF_RANGE.message in report
     assert "second" not in report
 
 
 def test_held_forces_are_applied_and_still_balance() -> None:
-    data, muscles, i = scene()
+    data, muscles, i = scene(xml=BEYOND)
     muscles.forward(data)
     muscles.excitation[muscles.index("third")] = 0.0
     muscles.apply(data)
     good = snapshot(muscles, i)
     data.qpos[0] = -0.08
     muscles.apply(data)
-    assert muscles.status[i] == mw.Status.ENDPOINT_INSIDE
+    assert muscles.status[i] == mw.Status.OUT_OF_RANGE
     assert muscles.failures[i] == 1
     pull = sum(force for body, _, force in muscles.forces(i) if body == data.model.body("sledge").id)
     assert np.array_equal(snapshot(muscles, i)[1], good[1])
@@ -168,17 +196,17 @@ def test_strict_stops_at_the_first_pose_without_a_path(integrator: int) -> None:
 
 
 def test_a_muscle_that_never_had_a_path_pulls_nothing_and_starts_on_the_side_of_its_hint() -> None:
-    data, muscles, i = scene()
+    data, muscles, i = scene(xml=BEYOND)
     data.qpos[0] = -0.08
     muscles.apply(data)
-    assert muscles.status[i] == mw.Status.ENDPOINT_INSIDE
+    assert muscles.status[i] == mw.Status.OUT_OF_RANGE
     assert muscles.tension[i] == 0.0
     assert muscles.forces(i) == []
     assert muscles.points(i).shape == (0, 3)
     assert np.isfinite(data.xfrc_applied).all()
-    data.qpos[0] = -0.05
+    data.qpos[0] = -0.01
     muscles.apply(data)
-    assert muscles.length[i] == pytest.approx(exact_length(0.05), rel=1e-12)
+    assert muscles.length[i] == pytest.approx(exact_length(0.1, -0.01), rel=1e-12)
 
 
 # ------------------------------------------------------------------------------------- states that are not finite

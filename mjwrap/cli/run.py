@@ -29,6 +29,7 @@ import sys
 import time
 
 import mujoco
+import numpy as np
 
 from mjwrap import Status, __version__
 from mjwrap.cli.arguments import add_model, pixels, positive
@@ -164,8 +165,8 @@ def begin(engine: Engine, excitation: Excitation, prescribed: Prescribed) -> Non
     excitation.write(engine.data)
     engine.look()
     muscles = engine.muscles
-    inside = [i for i, status in enumerate(muscles.status) if status == Status.ENDPOINT_INSIDE]
-    for i in inside[:1]:
+    inside = muscles.held & (muscles.status == Status.ENDPOINT_INSIDE)
+    for i in np.flatnonzero(inside)[:1].tolist():
         raise UserError(f"muscle '{muscles.names[i]}' has no path at the start: {muscles.reason(i)}")
 
 
@@ -222,7 +223,7 @@ def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: floa
             report.say(f"  {name}: {reason}")
     failed = engine.failures()
     if failed:
-        report.say("paths not found (the last good force was held):")
+        report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
     for what, option in OUTPUTS:

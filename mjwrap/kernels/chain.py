@@ -9,6 +9,7 @@ import numpy as np
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import allocating, jit
 from mjwrap.kernels.certify import minimal
+from mjwrap.kernels.foot import has_length
 from mjwrap.kernels.geodesics import displace
 from mjwrap.kernels.inside import hold_inside
 from mjwrap.kernels.jumps import solve_span
@@ -26,8 +27,9 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     """Find the path from (ox, oy, oz) to (ix, iy, iz) over nodes lo..hi; results go to info[row].
 
     Points in the world frame [m]. The rows hold the last evaluation relative to the first point. Never raises and
-    never leaves NaN in `info`: where no path is found the status says why and the length is that of the last iterate,
-    or of straight lines where even that is not finite, NON_FINITE ones left out.
+    never leaves NaN in `info`: where no path is found the status says why and the length is that of what stands in for
+    it (`foot.has_length`), else of the last iterate, or of straight lines where even that is not finite, NON_FINITE
+    ones left out.
     """
     total, square = 0.0, 0.0
     status, iterations, evaluations = lay.CONVERGED, 0, 0
@@ -56,7 +58,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
                 part, code = straight, lay.NOT_CONVERGED
             if not math.isfinite(error):
                 error = 1e300
-            if status == lay.CONVERGED:
+            if status == lay.CONVERGED or (status == lay.ENDPOINT_INSIDE and code != lay.CONVERGED):
                 status = code
             total += part
             square += error * error
@@ -176,7 +178,7 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
         if warm and j > 0 and _repaired(node):  # the straight continuation led astray
             _go_back(node, before)
             solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
-        if warm and info[j, I_STATUS] != lay.CONVERGED:
+        if warm and not has_length(info[j, I_STATUS], info[j, I_ERROR]):
             _go_back(node, before)
             for k in range(
                 n

@@ -11,6 +11,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.chain import solve_chain
+from mjwrap.kernels.foot import has_length, list_standing
 from mjwrap.kernels.segments import G_A, G_B, G_E, G_FAR, G_NEAR, VANISHING, list_segments
 
 # columns of `links` (N, 4): ids of a node's site, geom, hint site (-1 where none) and body
@@ -190,34 +191,38 @@ def solve_routes(
         ox, oy, oz = site_xpos[a, 0], site_xpos[a, 1], site_xpos[a, 2]
         ix, iy, iz = site_xpos[b, 0], site_xpos[b, 1], site_xpos[b, 2]
         solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, True, info, c)
-        if info[c, lay.I_STATUS] == lay.CONVERGED:
+        status = info[c, lay.I_STATUS]
+        if status == lay.CONVERGED:
             seg_count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
-            info[c, lay.I_SPEED] = _curved_speed(
-                c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid
-            )
-        else:
-            inside = (
-                info[c, lay.I_STATUS] == lay.ENDPOINT_INSIDE
-            )  # where a string comes out again is anybody's guess
-            _roll_back(lo, hi, cold or inside, node)
+        elif has_length(status, info[c, lay.I_ERROR]):
+            seg_count[c] = list_standing(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
+        else:  # where a string comes out again is anybody's guess
+            _roll_back(lo, hi, cold or status == lay.ENDPOINT_INSIDE, node)
+            continue
+        info[c, lay.I_SPEED] = _curved_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid)
 
 
 @jit
 def measure_muscles(routes, weights, info, length, velocity, status):
     """Turn solved routes into length [m], velocity [m/s] and status of every muscle, (n,) each.
 
-    A muscle with a route without a path keeps its last values; its status says why.
+    A muscle with a route without a path keeps its last values; its status says why. Where something stands in for every
+    path that is missing (`foot.py`), the muscle has values, and the status a minus sign.
     """
     c = 0
     for m in range(status.shape[0]):
         first = c
-        code = lay.CONVERGED
+        code, known = lay.CONVERGED, True
         total, speed = 0.0, 0.0
         while c < routes.shape[0] and routes[c, R_MUSCLE] == m:
-            if code == lay.CONVERGED:
-                code = int(info[c, lay.I_STATUS])
+            here = int(info[c, lay.I_STATUS])
+            if not has_length(here, info[c, lay.I_ERROR]):
+                code, known = here if known else code, False
+            elif code == lay.CONVERGED:
+                code = here
             c += 1
-        if code == lay.CONVERGED:
+        if known:
+            code = -code
             for r in range(first, c):
                 total += weights[r] * info[r, lay.I_LENGTH]
                 speed += weights[r] * info[r, lay.I_SPEED]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.coupling import R_HI, R_LO, R_MUSCLE
+from mjwrap.kernels.foot import has_length
 from mjwrap.kernels.polyline import polyline
 from mjwrap.kernels.segments import G_A, G_B, G_FAR
 
@@ -24,7 +25,7 @@ def route_points(c, routes, node, seg, seg_count, info, spacing, out, count):
         return count
     lo, hi = routes[c, R_LO], routes[c, R_HI]
     first, last = lo + c, lo + c + seg_count[c] - 1
-    if info[c, lay.I_STATUS] == lay.CONVERGED:
+    if has_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
         return count + polyline(
             lo, hi, seg[first, G_A], seg[first, G_A + 1], seg[first, G_A + 2],
             seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2], node, spacing, out, count,

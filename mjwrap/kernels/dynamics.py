@@ -84,7 +84,7 @@ def drive_muscles(
     here where it is zero); the tension is to act for `ahead` [s] from here. Over both an elastic tendon takes one
     implicit step, to the length that the path will have, so its tension is that at the end; with neither it is the
     tendon's at this state. Elsewhere the tension is that of this state. A muscle without a path (status) keeps its
-    tension and fibre length.
+    tension and fibre length; one with a minus sign goes on and loses it (`coupling.measure_muscles`).
     """
     duration = since + ahead
     for m in range(law.shape[0]):
@@ -98,8 +98,9 @@ def drive_muscles(
         if since <= 0.0:
             start_length[m] = length[m]
         activation[m], next_activation[m], next_fiber[m] = a, end, start_fiber[m]
-        if status[m] != lay.CONVERGED:
+        if status[m] > lay.CONVERGED:
             continue
+        status[m] = -status[m]
         if not is_elastic(law[m], params, m):
             force = law_tension(law[m], params, m, a, length[m], velocity[m])
             fiber[m] = rigid_fiber(params, m, length[m]) if has_fiber(law[m]) else NO_FIBER

@@ -13,10 +13,10 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.direct import closed_form
-from mjwrap.kernels.geodesics import geodesic
+from mjwrap.kernels.foot import stand_in
 from mjwrap.kernels.relax import between, keep
 from mjwrap.kernels.shape import turn_into_frame
-from mjwrap.kernels.span import any_in, outside, restore, settle, wrap_lone
+from mjwrap.kernels.span import any_in, last_row, restore, settle, take_back, wrap_lone
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T
@@ -66,12 +66,6 @@ def _shifted(k, node):
 
 
 @jit
-def _last_row(k, hi, node):
-    """Return the row behind the last one of row k's surface."""
-    return k + 2 if k + 1 < hi and node[k + 1, lay.TWIN] > 0.0 else k + 1
-
-
-@jit
 def _moved_far(lo, hi, ends, node):
     """Return whether a path just found is so far from the one before that it may have missed a surface or a side."""
     follows = False
@@ -81,7 +75,7 @@ def _moved_far(lo, hi, ends, node):
         follows = True
         if _shifted(k, node):
             return True
-        end = _last_row(k, hi, node)
+        end = last_row(k, hi, node)
         if node[k, W_OLD] == FREE and _swept(k, end, between(lo, hi, k, end, ends, node), node):
             return True
     return follows and node[lo, W_FIRST] > FAR * FAR * (hi - lo)
@@ -122,15 +116,6 @@ def _before(k, end, now, node):
 
 
 @jit
-def _take_back(lo, hi, ends, node):
-    """Go back to the solutions that W_START holds."""
-    keep(lo, hi, node, W_START, True)
-    for j in range(lo, hi):
-        if node[j, S_MODE] == TOUCHED:
-            geodesic(j, node, ends[0], ends[1], ends[2])
-
-
-@jit
 def _stride(k, end, now, node, tol):
     """Move the string over rows k..end from where it ran to its present ends `now`; return the evaluations spent."""
     known, old = _before(k, end, now, node)
@@ -151,7 +136,7 @@ def _stride(k, end, now, node, tol):
         status, _, _, _, e = settle(k, end, part, node, tol, False)
         spent += e
         if status == lay.ENDPOINT_INSIDE:
-            _take_back(k, end, now, node)
+            take_back(k, end, now, node)
             break
     return spent
 
@@ -167,13 +152,13 @@ def _recover(lo, hi, ends, node, tol, direct, found):
     keep(lo, hi, node, W_START, False)
     for k in range(lo, hi):
         if not closed_form(node[k, KIND]) and node[k, lay.TWIN] == 0.0:
-            end = _last_row(k, hi, node)
+            end = last_row(k, hi, node)
             evaluations += _stride(k, end, between(lo, hi, k, end, ends, node), node, tol)
     status, total, error, iterations, e = settle(lo, hi, ends, node, tol, direct)
     evaluations += e
     if not _found(status):
         if found:
-            _take_back(lo, hi, ends, node)
+            take_back(lo, hi, ends, node)
         else:
             for k in range(lo, hi):
                 node[k, S_MODE] = COLD
@@ -194,8 +179,8 @@ def solve_span(lo, hi, ends, node, tol, direct):
 
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     leaves the new one in its place; a path that is lost is searched for as at a cold start. With `direct` a single
-    obstacle is wrapped in closed form whatever is saved but its branch. Where an end lies inside a surface, the
-    length is that of the path from the surface point next to it.
+    obstacle is wrapped in closed form whatever is saved but its branch. Where an end lies inside a surface, length,
+    error and saved solution are those of what stands in for the path (`foot.py`).
     """
     warm = not any_in(lo, hi, node, COLD)
     if direct and warm and hi - lo == 1 and closed_form(node[lo, KIND]):
@@ -206,13 +191,17 @@ def solve_span(lo, hi, ends, node, tol, direct):
     status, total, error, iterations, evaluations = settle(lo, hi, ends, node, tol, direct)
     if _found(status) and not (warm and _moved_far(lo, hi, ends, node)):
         return status, total, error, iterations, evaluations
-    i, e = 0, 0
-    if status == lay.ENDPOINT_INSIDE:
-        _, ax, ay, az = outside(lo, hi, ends, node, 3)
-        _, bx, by, bz = outside(lo, hi, ends, node, 6)
-        restore(lo, hi, ends, node)
-        ends = (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
-        _, total, _, i, e = settle(lo, hi, ends, node, tol, direct)
-    elif warm:
+    if warm and status != lay.ENDPOINT_INSIDE:
         status, total, error, i, e = _recover(lo, hi, ends, node, tol, direct, _found(status))
-    return status, total, error, iterations + i, evaluations + e
+        iterations += i
+        evaluations += e
+    if status == lay.ENDPOINT_INSIDE:
+        if warm:
+            restore(lo, hi, ends, node)
+        else:
+            for k in range(lo, hi):
+                node[k, S_MODE] = COLD
+        total, error, i, e = stand_in(lo, hi, ends, node, tol, direct)
+        iterations += i
+        evaluations += e
+    return status, total, error, iterations, evaluations

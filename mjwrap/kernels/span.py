@@ -16,12 +16,10 @@ from mjwrap.kernels.certify import branched, minimal, slip
 from mjwrap.kernels.direct import closed_form, holds, wrap
 from mjwrap.kernels.geodesics import displace, geodesic
 from mjwrap.kernels.newton import GEODESICS, ON_SURFACE, UNKNOWN, connect, newton
-from mjwrap.kernels.relax import path_length, relax
-from mjwrap.kernels.shape import into_frame, project
+from mjwrap.kernels.relax import keep, path_length, relax
 from mjwrap.kernels.sides import search_rows, shorten
 from mjwrap.kernels.touch import MEETING, MET, drop, follow_branch, in_range, join, split, take_in
 
-DIM, POS, ROT = lay.DIM, lay.POS, lay.ROT
 HINT, S_MODE, W_OLD, W_Y, W_FRESH = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Y, lay.W_FRESH
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
@@ -117,26 +115,30 @@ def _slip_off(lo, hi, ends, node, sign):
 
 
 @jit
-def outside(lo, hi, ends, node, column):
-    """Return whether an end of the span lies inside an obstacle, and the end moved onto that obstacle's surface."""
-    x, y, z = ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
-    for k in range(lo, hi):
-        if holds(k, node, x, y, z):
-            px, py, pz = into_frame(node, k, x, y, z)
-            px, py, pz, _, _, _ = project(node, k, px, py, pz)
-            return (
-                True,
-                node[k, POS] + node[k, ROT] * px + node[k, ROT + 1] * py + node[k, ROT + 2] * pz - ends[0],
-                node[k, POS + 1] + node[k, ROT + 3] * px + node[k, ROT + 4] * py + node[k, ROT + 5] * pz - ends[1],
-                node[k, POS + 2] + node[k, ROT + 6] * px + node[k, ROT + 7] * py + node[k, ROT + 8] * pz - ends[2],
-            )  # fmt: skip
-    return False, ends[column], ends[column + 1], ends[column + 2]
+def last_row(k, hi, node):
+    """Return the row behind the last one of row k's surface."""
+    return k + 2 if k + 1 < hi and node[k + 1, lay.TWIN] > 0.0 else k + 1
+
+
+@jit
+def take_back(lo, hi, ends, node):
+    """Go back to the solutions that W_START holds."""
+    keep(lo, hi, node, lay.W_START, True)
+    for j in range(lo, hi):
+        if node[j, S_MODE] == TOUCHED:
+            geodesic(j, node, ends[0], ends[1], ends[2])
 
 
 @jit
 def _end_inside(lo, hi, ends, node):
     """Return whether an end of the span lies inside an obstacle."""
-    return outside(lo, hi, ends, node, 3)[0] or outside(lo, hi, ends, node, 6)[0]
+    x, y, z = ends[0], ends[1], ends[2]
+    for k in range(lo, hi):
+        if holds(k, node, x + ends[3], y + ends[4], z + ends[5]):
+            return True
+        if holds(k, node, x + ends[6], y + ends[7], z + ends[8]):
+            return True
+    return False
 
 
 @jit
@@ -244,7 +246,9 @@ def settle(lo, hi, ends, node, tol, direct):
             _, status = take_in(lo, hi, ends, node)
             if status == lay.CONVERGED:
                 status = lay.NOT_CONVERGED
-    elif status == lay.CONVERGED and _ends_short(lo, hi, node) and _end_inside(lo, hi, ends, node):
+    elif (
+        status == lay.PENETRATING or (status == lay.CONVERGED and _ends_short(lo, hi, node))
+    ) and _end_inside(lo, hi, ends, node):
         status = lay.ENDPOINT_INSIDE
     elif status == lay.CONVERGED and not in_range(lo, hi, ends, node):
         status = lay.OUT_OF_RANGE

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import layout, polyline, segments
+from mjwrap.kernels import foot, layout, polyline, segments
 from mjwrap.paths.derivatives import Derivatives
 from mjwrap.paths.scene import SAVED, Array, Point
 from mjwrap.paths.status import Status
@@ -59,10 +59,13 @@ class PathSolution(Derivatives):
         self.tangency_error = float(info[layout.I_ERROR])
         self.iterations = int(info[layout.I_ITERATIONS])
         self.evaluations = int(info[layout.I_EVALUATIONS])
-        self._saved = self._node[:, SAVED].copy() if self.converged else saved_before.copy()
-        if self.status == Status.ENDPOINT_INSIDE:
+        known = foot.has_length(self.status, self.tangency_error)
+        self._saved = self._node[:, SAVED].copy() if known else saved_before.copy()
+        if self.status == Status.ENDPOINT_INSIDE and not known:
             self._saved[:, 0] = layout.COLD  # where a string comes out again is anybody's guess
-        self._count = segments.list_segments(*self._ends, self._node, self._segments, 0)
+        stands_in = known and not self.converged
+        list_them = foot.list_standing if stands_in else segments.list_segments
+        self._count = list_them(*self._ends, self._node, self._segments, 0)
         self.contacts = []
         for row, k in enumerate(self._owner):
             contact = self._contact(row)

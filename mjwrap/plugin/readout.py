@@ -31,9 +31,7 @@ class Readout:
     activation: Array
     fiber_length: Array
     status: NDArray[np.int64]
-    failures: NDArray[
-        np.int64
-    ]  # steps since the last reset without a path, at which the last good force was held
+    failures: NDArray[np.int64]  # steps since the last reset without a path
     transmitted: NDArray[np.bool_]  # pulled by MuJoCo's own actuator, whose force this tension is
 
 

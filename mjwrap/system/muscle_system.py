@@ -112,14 +112,14 @@ class MuscleSystem(Evaluator):
     ) -> Energetics:
         """Return powers, stored energies and, with `metabolism`, metabolic cost of all muscles at the last evaluation.
 
-        metabolism: one model for all muscles, or one each. Muscles without a path there, and those switched off, have
+        metabolism: one model for all muscles, or one each. Muscles that are `held` there, and those switched off, have
         zeros; `StateError` before the first evaluation. With an elastic tendon they are those of the state there,
         whose tendon force the `tension` of a step, which is the one at its end, leaves by the first order of the step.
         """
         plan, state = self._plan, self._last
         if not state.evaluated:
             raise StateError("no muscle has been evaluated yet: call forward, apply or step first")
-        idle = (state.status != 0) | self._disabled()
+        idle = self.held | self._disabled()
         constants = metabolic_constants(metabolism, plan.law, plan.params)
         return compute_energetics(
             np.where(idle, PATH_ACTUATOR, plan.law), plan.params, np.where(idle, 0.0, state.activation), state.drive,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import coupling, drawing, layout, segments
+from mjwrap.kernels import coupling, drawing, foot, layout, segments
 from mjwrap.mjcf import Declarations, MuscleDeclaration
 from mjwrap.paths import Status
 from mjwrap.plan import Plan, last_dofs
@@ -81,6 +81,15 @@ class Results:
         return self._evaluation().status.copy()
 
     @property
+    def held(self) -> NDArray[np.bool_]:
+        """Whether each muscle (n,) keeps its last good length, velocity and tension, for want of a path.
+
+        False where it has a path, and where an end lies inside a surface but the length goes on from the surface.
+        """
+        status, error = self._evaluation().status, self.tangency_error
+        return (status != Status.CONVERGED) & ((status != Status.ENDPOINT_INSIDE) | (error >= foot.NOWHERE))
+
+    @property
     def iterations(self) -> NDArray[np.int64]:
         """Iterations (n,) that the search for the paths took, those of all routes of a muscle together."""
         counts = self._evaluation().info[:, layout.I_ITERATIONS]
@@ -90,7 +99,8 @@ class Results:
     def tangency_error(self) -> Array:
         """Tangency errors (n,): the largest of each muscle's routes, 0 where it touches no surface."""
         found = np.zeros(self.n)
-        np.maximum.at(found, self._plan.routes[:, coupling.R_MUSCLE], self._last.info[:, layout.I_ERROR])
+        errors = self._evaluation().info[:, layout.I_ERROR]
+        np.maximum.at(found, self._plan.routes[:, coupling.R_MUSCLE], errors)
         return found
 
     @property
@@ -100,7 +110,7 @@ class Results:
 
     @property
     def failures(self) -> NDArray[np.int64]:
-        """Number of steps (n,) at which a muscle's path was not found and its last good force was held."""
+        """Number of steps (n,) at which a muscle had no path, whether its force was held or not."""
         return self._evaluation().failures.copy()
 
     def index(self, name: str) -> int:
