@@ -10,7 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from declared_models import EXTENSOR, HILL, MUSCLE, compiled, declared, element
+from declared_models import EXTENSOR, HILL, MUSCLE, PULLEYS, compiled, declared, element
 from mjcf_reading import MODELS, load
 
 import mjwrap as mw
@@ -212,3 +212,20 @@ def test_two_muscles_between_the_same_sites_are_two() -> None:
     assert muscles.names == ["a", "extensor"]
     alone = mw.MuscleSystem(compiled(tendon=EXTENSOR))
     assert tensions(muscles)[0] == tensions(alone)[0]
+
+
+def test_no_line_is_drawn_from_one_route_of_a_muscle_to_the_next() -> None:
+    """Routes joined by pulleys are strips of their own, each from its first site to its last."""
+    model = compiled(tendon=PULLEYS)
+    data, muscles = mujoco.MjData(model), mw.MuscleSystem(model)
+    muscles.forward(data)
+    points, site = muscles.points(0), muscles.poses(data).site
+    gaps = np.flatnonzero(np.isnan(points).all(axis=1))
+    assert np.isnan(points).sum() == 3 * len(gaps) == 6
+    ends = ("origin", "via"), ("via", "insertion"), ("via", "insertion")
+    for strip, names in zip(np.split(points, gaps), ends, strict=True):
+        drawn = strip[~np.isnan(strip[:, 0])]
+        assert drawn[[0, -1]] == pytest.approx(np.array([site(name).xpos for name in names]), abs=1e-15)
+    everything, starts = muscles.polylines()
+    assert np.array_equal(everything, points, equal_nan=True)
+    assert starts.tolist() == [0, len(points)]

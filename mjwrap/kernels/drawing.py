@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.coupling import R_HI, R_LO, R_MUSCLE
@@ -50,10 +52,11 @@ def route_contacts(c, routes, node, seg, seg_count, out, count):
 
 @jit
 def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
-    """Write the points of every muscle's path to out and where each muscle begins to starts (n + 1,); return how many.
+    """Write the points of all paths to out and where each muscle begins to starts (n + 1,); return how many.
 
-    only: one muscle's index, or -1 for all. Routes without a path at the last evaluation are drawn along the segments
-    that they hold. Where `out` is too short the points are counted and not written. World frame [m].
+    only: one muscle's index, or -1 for all. A row of NaN stands between routes joined by pulleys, where no line is.
+    Routes without a path at the last evaluation are drawn along the segments that they hold. Where `out` is too short
+    the points are counted and not written. World frame [m].
     """
     count = 0
     muscle = -1
@@ -62,6 +65,8 @@ def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
             muscle += 1
             starts[muscle] = count
         if only < 0 or only == muscle:
+            if count > starts[muscle] and seg_count[c] > 0:
+                count = _append(out, count, math.nan, math.nan, math.nan)
             count = route_points(c, routes, node, seg, seg_count, info, spacing, out, count)
     while muscle + 1 < starts.shape[0]:
         muscle += 1

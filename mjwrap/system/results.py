@@ -163,13 +163,17 @@ class Results:
     def points(self, i: int, spacing: float | None = None) -> Array:
         """Return the polyline of muscle i, (m, 3), world [m], at the last evaluation; empty before the first.
 
-        spacing [m]: largest distance between points; None: as many as the curvature asks for. Routes joined by
-        pulleys follow one another. A muscle whose path was not found is drawn along the force that it holds.
+        spacing [m]: largest distance between points; None: as many as the curvature asks for. Between routes
+        joined by pulleys is a row of NaN, so that a plot has no line there. A muscle whose path was not found is drawn
+        along the force that it holds.
         """
         return self._polylines(spacing, self._known(i))[0]
 
     def polylines(self, spacing: float | None = None) -> tuple[Array, NDArray[np.int64]]:
-        """Return the polylines of all muscles: points (m, 3), starts (n + 1,); muscle i has starts[i]:starts[i + 1]."""
+        """Return the polylines of all muscles: points (m, 3), starts (n + 1,); muscle i has starts[i]:starts[i + 1].
+
+        A row of NaN stands between routes of a muscle that are joined by pulleys.
+        """
         return self._polylines(spacing, -1)
 
     def contact_points(self, i: int) -> Array:
