@@ -134,6 +134,25 @@ def mujoco_names(path: str) -> list[str]:
     return [model.actuator(i).name for i in range(model.nu)]
 
 
+def test_inspect_says_mistakes_before_anything_else(capsys: pytest.CaptureFixture[str]) -> None:
+    ran = inspect(capsys, ELBOW, "--range", "knee=0,1")
+    assert (ran.code, ran.out) == (2, "")
+    assert said(ran) == ["mjwrap inspect: no joint 'knee' to give a range; joints: elbow_flexion"]
+
+
+def test_files_are_written_where_nobody_reads_standard_output(tmp_path: Path) -> None:
+    codes = []
+    for options in (["--csv", tmp_path / "c.csv", "--json", tmp_path / "j.json"], []):
+        with start("run", ELBOW, "--duration", 0.01, *options) as process:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            process.stdout.close()
+            assert "Traceback" not in process.stderr.read()
+        codes.append(process.returncode)
+    assert codes == [0, 1]
+    assert json.loads((tmp_path / "j.json").read_text())["files"] == {"csv": str(tmp_path / "c.csv")}
+
+
 def test_inspect_says_what_stays_native_and_why(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "m.xml"
     muscle = '<muscle name="joint" joint="cylinder_y" lengthrange="0 1"/>'

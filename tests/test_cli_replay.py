@@ -1,12 +1,11 @@
 """mjwrap replay: says what a recording holds, serves it, and refuses a damaged one in one line."""
 
-import contextlib
 import json
+import re
 import signal
 import socket
 import subprocess
 import sys
-import time
 import urllib.request
 from pathlib import Path
 
@@ -16,10 +15,11 @@ import pytest
 
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 
-from cli_runs import CASE2, ELBOW, Ran, run_here
+from cli_runs import CASE2, ELBOW, Ran, run_here, start
 from made_up_runs import XML, simulate
 
 import mjwrap as mw
+from mjwrap.recording import read_summary
 
 
 @pytest.fixture(scope="module")
@@ -86,22 +86,48 @@ def test_replay_serves_to_a_browser(model: mujoco.MjModel, tmp_path: Path) -> No
 
     command = [sys.executable, "-m", "mjwrap", "replay", str(tmp_path / "run.rrd"), "--serve"]
     with subprocess.Popen([*command, "--port", str(port)], stdout=subprocess.PIPE, text=True) as server:
-        try:
-            assert server.stdout is not None
-            address = server.stdout.readline().split()[-1]
-            assert address.startswith(f"http://127.0.0.1:{port}?url=")
-            page = b""
-            deadline = time.monotonic() + 30
-            while not page and time.monotonic() < deadline:
-                with contextlib.suppress(OSError):
-                    page = urllib.request.urlopen(address, timeout=5).read()
-            assert b"<html" in page
-        finally:
-            server.send_signal(signal.SIGINT)
-            assert server.wait(timeout=20) == 0
+        assert server.stdout is not None
+        check_serving(server, server.stdout.readline().split()[-1], port)
+
+
+def check_serving(server: "subprocess.Popen[str]", address: str, port: int) -> None:
+    """See that a browser gets a page, and that Ctrl-C ends all that serves it."""
+    try:
+        assert address.startswith(f"http://127.0.0.1:{port}?url=")
+        assert b"<html" in urllib.request.urlopen(address, timeout=5).read()
+    finally:
+        server.send_signal(signal.SIGINT)
+        assert server.wait(timeout=20) == 0
+    for number in (port, port + 1):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", number))  # nobody is left there
+
+
+def test_a_run_is_served_to_a_browser(tmp_path: Path) -> None:
+    """The run sends its states to the server, which is there before it and stays after it."""
     with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        probe.bind(("127.0.0.1", port))  # nobody is left there
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    options = [
+        "--duration",
+        0.1,
+        "--sample",
+        0.002,
+        "--serve",
+        "--port",
+        port,
+        "--record",
+        tmp_path / "r.rrd",
+    ]
+    with start("run", ELBOW, *options, "--groups", "flexors=BIC*,BRA", "--rate", 60) as run:
+        assert run.stderr is not None
+        (address,) = re.findall(r"open (http\S+)", run.stderr.readline())
+        assert any("still served" in line for line in run.stderr)  # the run is over
+        check_serving(run, address, port)
+    held = read_summary(tmp_path / "r.rrd")
+    assert held.states == 7  # the 2 ms steps after every 60th of a second, and the first
+    assert "/groups/activation/flexors" in held.entities
 
 
 # -------------------------------------------------------------------------- from a table of states

@@ -162,7 +162,8 @@ def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries:
     """Say how far the two runs drift apart."""
     say(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
     if changed:
-        say(f"  {counted(len(changed), 'muscle')} with another law, here by MuJoCo's curves (see --law)")
+        those = counted(len(changed), "muscle")
+        say(f"  {those} of another law by MuJoCo's curves in both (--law declared: by their own)")
     dof, gap, when = motion.worst()
     last, final = motion.final()
     say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from mjwrap.cli.arguments import port, positive
@@ -108,9 +108,10 @@ def end(server: Server) -> None:
     server.process.wait()
 
 
-def serve_until_stopped(server: Server) -> int:
-    """Serve until Ctrl-C or the end of the server; return the exit code."""
+def serve_until_stopped(server: Server, tell: Callable[[], object]) -> int:
+    """Tell where, and serve until Ctrl-C or the end of the server; return the exit code."""
     try:
+        tell()
         return server.process.wait()
     except Stopped as stop:
         return 0 if stop.name == "Ctrl-C" else stop.code

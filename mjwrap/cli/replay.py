@@ -76,8 +76,7 @@ def show(options: argparse.Namespace, path: str) -> int:
     if options.serve or not has_display():
         with uninterrupted():
             server = serve(path, options.port)
-        say(f"open {server.address}\nCtrl-C stops serving")
-        return serve_until_stopped(server)
+        return serve_until_stopped(server, lambda: say(f"open {server.address}\nCtrl-C stops serving"))
     return open_native(path)
 
 

@@ -145,7 +145,10 @@ def execute(options: argparse.Namespace) -> int:
             name = interrupt.asked.name
             print(f"mjwrap run: stopped by {name}; the files hold what was simulated", file=sys.stderr)
             return interrupt.asked.code
-        return serve_until_stopped(server) if server else 0
+        if server:
+            told = "mjwrap run: done, and still served; Ctrl-C stops serving"
+            return serve_until_stopped(server, lambda: print(told, file=sys.stderr))
+        return 0
 
 
 def start_server(options: argparse.Namespace, stack: contextlib.ExitStack) -> Server | None:
@@ -155,7 +158,7 @@ def start_server(options: argparse.Namespace, stack: contextlib.ExitStack) -> Se
     with uninterrupted():
         server = opened(lambda: serve(port=options.port))
         stack.callback(end, server)
-    print(f"mjwrap run: open {server.address}; Ctrl-C stops serving", file=sys.stderr)
+    print(f"mjwrap run: open {server.address}", file=sys.stderr)
     return server
 
 
