@@ -167,7 +167,7 @@ def test_states_by_opensims_names_in_degrees(tmp_path: Path, capsys: pytest.Capt
     facts = json.loads(ran.out)
     assert facts["remarks"] == [
         "velocities are differences of the positions",
-        "6 of 7 activations not given: as at the start",
+        "6 of 7 activations not given: TRIlong, TRIlat, TRImed, BIClong, BICshort, ...: as at the start",
         "1 column not about the state: /ground_force/px",
     ]
     table = mw.read_table(out)

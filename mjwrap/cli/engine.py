@@ -8,6 +8,7 @@ import mujoco
 
 from mjwrap import MuscleSystem, Status
 from mjwrap.cli.models import load, load_spec
+from mjwrap.cli.states import put_own
 from mjwrap.errors import PathError, StateError
 from mjwrap.system.checks import resets
 from mjwrap.wording import counted
@@ -103,12 +104,10 @@ class PluginEngine:
         for name in ("qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat"):
             getattr(seen, name)[:] = getattr(data, name)
         if self._own:
-            held, branch = self._read(self.fresh()), self.muscles.branch(seen)
-            own = branch[-2 * self.muscles.n :].reshape(-1, 2)
-            for i in self._own:
-                k = held.names.index(self.muscles.names[i])
-                own[i] = held.activation[k], held.fiber_length[k]
-            self.muscles.set_branch(seen, branch)
+            held = self._read(self.fresh())
+            places = {i: held.names.index(self.muscles.names[i]) for i in self._own}
+            own = {i: (float(held.activation[k]), float(held.fiber_length[k])) for i, k in places.items()}
+            put_own(self.muscles, seen, own)
         self.muscles.forward(seen)
 
     def failures(self) -> dict[str, str]:

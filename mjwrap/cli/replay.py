@@ -1,7 +1,8 @@
 """Look at a recording, or at a file of states: in rerun's own viewer, in a browser, or say what it holds.
 
 FILE is a recording (.rrd), or a table of states over time (.sto, .mot, .csv, .npz) of the model that --model names.
-Its columns: qpos:JOINT, qvel:JOINT, act:ACTUATOR or activation:MUSCLE, as mjwrap run writes them; qpos[0] and so on;
+Its columns: qpos:JOINT, qvel:JOINT, act:ACTUATOR or activation:MUSCLE and fiber_length:MUSCLE, as mjwrap run writes
+them; qpos[0] and so on;
 JOINT/value, JOINT/speed, MUSCLE/activation or just JOINT, as in OpenSim's files. An NPZ file may have arrays time,
 qpos, qvel and act instead. Paths and forces are computed again from them.
 

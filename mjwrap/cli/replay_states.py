@@ -33,13 +33,13 @@ def recompute(options: argparse.Namespace, recording: str | None) -> None:
     with contextlib.ExitStack() as stack:
         with uninterrupted():
             logs, close = open_outputs(options, model, muscles, recording, stack)
-        states.put(data, 0)
+        states.put(muscles, data, 0)
         muscles.forward(data)  # compiles where that is still to do
         bar = progress_bar(len(states.time), "states", "computing paths")
         done = 0
         with Interrupt() as interrupt, contextlib.closing(bar):
             while done < len(states.time) and not (done and interrupt.asked):
-                states.put(data, done)
+                states.put(muscles, data, done)
                 muscles.forward(data)
                 failures += muscles.status != 0
                 for log in logs:

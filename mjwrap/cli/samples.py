@@ -20,7 +20,7 @@ from mjwrap.output import PartFile
 Array = NDArray[np.float64]
 MUSCLE_KINDS = ("activation", "fiber_length", "length", "velocity", "tension")
 KINDS = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS, "moment_arm")
-USUAL = "qpos,qvel,ctrl,activation,length,velocity,tension"
+USUAL = "qpos,qvel,act,ctrl,activation,fiber_length,length,velocity,tension"
 
 
 class Column(NamedTuple):
