@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -128,6 +129,41 @@ def test_a_run_is_served_to_a_browser(tmp_path: Path) -> None:
     held = read_summary(tmp_path / "r.rrd")
     assert held.states == 7  # the 2 ms steps after every 60th of a second, and the first
     assert "/groups/activation/flexors" in held.entities
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_server_that_is_ended_leaves_nobody_behind(
+    name: str, model: mujoco.MjModel, tmp_path: Path
+) -> None:
+    simulate(model, tmp_path / "run.rrd", steps=3)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "mjwrap", "replay", str(tmp_path / "run.rrd"), "--serve"]
+    with subprocess.Popen([*command, "--port", str(port)], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        address = server.stdout.readline().split()[-1]
+        until(lambda: answers(address), "the server answers")
+        number = getattr(signal, name)
+        server.send_signal(number)
+        assert server.wait(timeout=20) == 128 + number
+    until(lambda: not answers(address), "the server is gone")
+
+
+def until(holds: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + 30
+    while not holds():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.05)
+
+
+def answers(address: str) -> bool:
+    try:
+        with urllib.request.urlopen(address, timeout=5) as page:
+            return b"<html" in page.read()
+    except OSError:
+        return False
 
 
 # -------------------------------------------------------------------------- from a table of states

@@ -2,9 +2,8 @@
 
 FILE is a recording (.rrd), or a table of states over time (.sto, .mot, .csv, .npz) of the model that --model names.
 Its columns: qpos:JOINT, qvel:JOINT, act:ACTUATOR or activation:MUSCLE and fiber_length:MUSCLE, as mjwrap run writes
-them; qpos[0] and so on;
-JOINT/value, JOINT/speed, MUSCLE/activation or just JOINT, as in OpenSim's files. An NPZ file may have arrays time,
-qpos, qvel and act instead. Paths and forces are computed again from them.
+them; qpos[0] and so on; JOINT/value, JOINT/speed, MUSCLE/activation or just JOINT, as in OpenSim's files. An NPZ file
+may have arrays time, qpos, qvel and act instead. Paths and forces are computed again from them.
 
 Without an option the viewer opens, or where there is no display the recording is served to a browser.
 
