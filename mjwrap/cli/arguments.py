@@ -65,3 +65,13 @@ def port(text: str) -> int:
     if number >= 65535:
         raise argparse.ArgumentTypeError(f"{text} must lie between 1 and 65534")
     return number
+
+
+def add_analysis(add: Callable[..., object]) -> None:
+    """Add the option --analysis by a parser's or group's add_argument."""
+    add(
+        "--analysis",
+        metavar="PREFIX",
+        help="lengths, fibre lengths, tensions and moment arms as OpenSim's MuscleAnalysis names them: "
+        "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto",
+    )

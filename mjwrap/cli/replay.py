@@ -22,6 +22,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from mjwrap.cli.arguments import add_analysis
 from mjwrap.cli.errors import UserError
 from mjwrap.cli.output import Report, add_json, say
 from mjwrap.cli.recorded import HOW, add_recording, add_serving, check_how, serve_until_stopped
@@ -47,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     states.add_argument("--out", metavar="FILE", help="paths and forces as a table")
     states.add_argument("--columns", default=COLUMNS, metavar="KINDS", help="what it holds, as mjwrap run has it "
         "(default %(default)s)")  # fmt: skip
+    add_analysis(states.add_argument)
     add_json(parser, "what the file holds")
 
 
@@ -55,7 +57,7 @@ def execute(options: argparse.Namespace) -> int:
     try:
         if Path(options.file).suffix.lower() in (".sto", ".mot", ".csv", ".npz"):
             return replay_states(options)
-        for option in ("model", "keyframe", "record", "connect", *HOW, "out"):
+        for option in ("model", "keyframe", "record", "connect", *HOW, "out", "analysis"):
             if getattr(options, option):
                 raise UserError(
                     f"--{option.replace('_', '-')} goes with a table of states, and '{options.file}' is none"
@@ -90,10 +92,11 @@ def replay_states(options: argparse.Namespace) -> int:
         raise UserError(f"'{options.file}' is a table of states: --model says of which model")
     if options.columns != COLUMNS and not options.out:
         raise UserError("--columns says what a table holds: it goes with --out")
-    kept = options.record or options.out or options.connect
+    kept = options.record or options.out or options.analysis or options.connect
     if kept and options.serve:
         raise UserError(
-            "--serve is for what is not kept: leave --record, --connect and --out away, or replay the recording"
+            "--serve is for what is not kept: leave --record, --connect, --out and --analysis away, or replay the "
+            "recording"
         )
     if kept or options.info or options.json:
         check_how(options, bool(options.record or options.connect), "--record or --connect")

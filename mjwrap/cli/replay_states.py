@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjwrap import MuscleSystem, read_table
+from mjwrap.cli.analysis import Analysis
 from mjwrap.cli.models import load, start_keyframe, start_state
 from mjwrap.cli.output import Report, open_output
 from mjwrap.cli.progress import progress_bar
@@ -57,7 +58,8 @@ def recompute(options: argparse.Namespace, recording: str | None) -> None:
     report.say(f"{options.file}: {counted(done, 'state')} of {options.model}, {span}")
     for line in (*states.remarks, *(f"{name}: {why}" for name, why in without.items())):
         report.say(f"  {line}")
-    files = {what: path for what, path in (("recording", options.record), ("table", options.out)) if path}
+    outputs = (("recording", options.record), ("table", options.out), ("analysis", options.analysis))
+    files = {what: path for what, path in outputs if path}
     for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
     report.finish({
@@ -74,11 +76,18 @@ def open_outputs(
     stack: contextlib.ExitStack,
 ) -> tuple[list[Callable[[mujoco.MjData], object]], Callable[[], None]]:  # fmt: skip
     """Open what was asked for: what to call at each state, and what at the end."""
-    samples = None
+    tables: list[Samples | Analysis] = []
     if options.out:
         output = open_output(options.out, "--out", *SUFFIXES)
-        samples = Samples(output, model, muscles, choose_kinds(options.columns))
-    logs: list[Callable[[mujoco.MjData], object]] = [samples.log] if samples else []
+        tables.append(Samples(output, model, muscles, choose_kinds(options.columns)))
+    if options.analysis:
+        tables.append(Analysis(options.analysis, model, muscles))
+    logs: list[Callable[[mujoco.MjData], object]] = [table.log for table in tables]
     if recording or options.connect:
         logs.append(open_recorder(options, model, muscles, stack, recording, options.connect or "").log)
-    return logs, samples.close if samples else lambda: None
+
+    def close() -> None:
+        for table in tables:
+            table.close()
+
+    return logs, close

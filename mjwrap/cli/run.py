@@ -32,7 +32,7 @@ import mujoco
 import numpy as np
 
 from mjwrap import Status, __version__
-from mjwrap.cli.arguments import add_model, pixels, positive
+from mjwrap.cli.arguments import add_analysis, add_model, pixels, positive
 from mjwrap.cli.engine import MODES, Engine, start_engine
 from mjwrap.cli.errors import UserError
 from mjwrap.cli.models import INTEGRATORS, set_state, start_keyframe
@@ -99,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files("--csv", metavar="FILE.csv", help="another table, or the only one, as CSV")
     files("--columns", default=USUAL, metavar="KINDS", help="what the tables hold, of "
         f"{', '.join(KINDS)} (default {USUAL})")  # fmt: skip
+    add_analysis(files)
     add_json(parser, "what was run, how fast, and what went wrong")
 
 

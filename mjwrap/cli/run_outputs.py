@@ -9,6 +9,7 @@ from pathlib import Path
 
 import mujoco
 
+from mjwrap.cli.analysis import Analysis
 from mjwrap.cli.engine import Engine, PluginEngine
 from mjwrap.cli.history import History
 from mjwrap.cli.output import open_output, opened
@@ -18,7 +19,8 @@ from mjwrap.cli.samples import Samples, choose_kinds
 from mjwrap.files import SUFFIXES
 
 Log = Callable[[mujoco.MjData], object]
-OUTPUTS = (("recording", "record"), ("video", "video"), ("plot", "plot"), ("csv", "csv"), ("table", "out"))
+OUTPUTS = (("recording", "record"), ("video", "video"), ("plot", "plot"), ("csv", "csv"), ("table", "out"),
+           ("analysis", "analysis"))  # fmt: skip
 
 
 def open_outputs(
@@ -42,6 +44,10 @@ def open_outputs(
         samples = Samples(output, model, muscles, kinds)
         logs.append(samples.log)
         closes.append(samples.close)
+    if options.analysis:
+        analysis = Analysis(options.analysis, model, muscles)
+        logs.append(analysis.log)
+        closes.append(analysis.close)
     connect = connect or options.connect or ""
     if options.record or connect:
         logs.append(open_recorder(options, model, muscles, stack, options.record, connect).log)
