@@ -124,8 +124,8 @@ def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
     say(f"\njumps along the sweeps: {len(jumps)}{starred(jumps)}; the largest of each muscle and joint")
     for jump in sorted(largest.values(), key=lambda j: (j.program, j.muscle, j.sweep)):
         say(
-            f"  {jump.program} {jump.muscle} at {jump.where}: {1e3 * jump.length:+.3f} mm, "
-            f"moment arm {-1e3 * jump.slope:+.3f} mm; {jump.before} -> {jump.after}"
+            f"  {jump.program} {jump.muscle} at {jump.where}: {millimetres(jump.length)} mm, "
+            f"moment arm {millimetres(-jump.slope)} mm; {jump.before} -> {jump.after}"
         )
 
 
@@ -133,6 +133,12 @@ def starred(jumps: Sequence[Jump]) -> str:
     """Say how many of some jumps are at joints that were moved without those that they are coupled to."""
     alone = sum(jump.alone for jump in jumps)
     return f", {alone} of them (*) at joints that follow others and were moved alone" if alone else ""
+
+
+def millimetres(metres: float, digits: int = 3) -> str:
+    """Return a difference in mm with its sign; 0 for what the digits cannot show."""
+    text = f"{1e3 * metres:+.{digits}f}"
+    return text if float(text) else "0"
 
 
 def where(extreme: Extreme) -> str:
@@ -154,7 +160,7 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
     )
     for d in sorted(tables, key=lambda d: -d.spread):
         what = f"moment arm, {d.about}" if d.about else "length"
-        numbers = "".join(f"{1e3 * x:>10.4f}" for x in (d.mean, d.spread, d.largest))
+        numbers = "".join(f"{millimetres(x, 4):>10}" for x in (d.mean, d.spread, d.largest))
         say(f"{d.muscle:{wide}}  {d.program:7s}  {what:25s}  {d.rows:6d}{numbers}  {d.time:g}")
 
 

@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import mujoco
 
 import mjwrap
-from mjwrap.cli.compare_files import TITLES, starred, where
+from mjwrap.cli.compare_files import TITLES, millimetres, starred, where
 from mjwrap.cli.plot_compare import COLOURS, draw_motion, draw_sweep
 from mjwrap.comparison import (
     AGREE,
@@ -32,18 +32,20 @@ from mjwrap.wording import counted
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; }
-body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 72rem; padding: 0 1rem; }
+body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 84rem; padding: 0 1rem; }
 h1 { font-size: 1.5rem; margin-bottom: .2rem; } h2 { margin-top: 2.2rem; font-size: 1.2rem; }
 code { font-size: .9em; overflow-wrap: anywhere; }
 table { border-collapse: collapse; font-size: .86rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .22rem .55rem; text-align: right; border-bottom: 1px solid var(--line); vertical-align: top; }
-th, td { white-space: nowrap; } td.text, th.text { text-align: left; } details td.text { white-space: normal; }
+th { vertical-align: bottom; } td { white-space: nowrap; }
+td.text, th.text { text-align: left; } details td.text { white-space: normal; }
 .scroll { overflow-x: auto; } .facts { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1rem 0; }
 .fact { background: var(--soft); border-radius: .5rem; padding: .5rem .9rem; }
 .fact b { font-size: 1.35rem; display: block; }
 .bar { display: flex; width: 9rem; height: .8rem; border-radius: .2rem; overflow: hidden; }
+.bar span { min-width: .3rem; }
 .spot { display: inline-block; width: .8rem; height: .8rem; margin-right: .4rem; }
-ul.key { list-style: none; padding: 0; }
+ul.key { list-style: none; padding: 0; margin: .5rem 0; display: flex; flex-wrap: wrap; gap: .2rem 1.4rem; }
 details { border: 1px solid var(--line); border-radius: .5rem; margin: .5rem 0; padding: .3rem .9rem; }
 summary { cursor: pointer; padding: .25rem 0; } .dim { opacity: .7; }
 figure { margin: .6rem 0; background: #fff; border-radius: .4rem; padding: .4rem; }
@@ -52,6 +54,7 @@ svg { max-width: 100%; height: auto; }
 _RIGHT = {
     "both": "both",
     "mjwrap": "mjwrap",
+    "mjwrap in motion": "both; in motion mjwrap",
     "MuJoCo": "MuJoCo",
     "neither": "no path exists",
     "-": "stays native",
@@ -74,13 +77,14 @@ def write_page(
         f"<p class='dim'>{versions}. Made by <code>{_text(command)}</code></p>",
         _facts(found, verdicts),
         "<h2>All muscles</h2>",
+        _key(found),
         _muscles(found, verdicts),
     ]
     if tables:
         parts += ["<h2>Beside the given tables</h2>", _tables(tables)]
     if motion is not None and motion.difference.size:
         parts += ["<h2>Motion of both with the same controls</h2>", _motion(motion)]
-    parts += ["<h2>Muscle by muscle</h2>", _details(found, verdicts), _left_out(found), _key()]
+    parts += ["<h2>Muscle by muscle</h2>", _details(found, verdicts), _left_out(found)]
     page = (
         "<!doctype html><html lang='en'><head><meta charset='utf-8'><meta name='viewport' content='width=device-width'>"
         f"<title>{_text(model)}: comparison</title><style>{_STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
@@ -124,8 +128,9 @@ def _count(jumps: list[Jump]) -> str:
 
 def _largest(jumps: Sequence[Jump]) -> str:
     """Say how large the largest of these jumps is: in length, or in moment arm where no length jumps."""
-    length = 1e3 * max(abs(j.length) for j in jumps)
-    return f"to {length:.3g} mm" if length else f"arm, to {1e3 * max(abs(j.slope) for j in jumps):.3g} mm"
+    length = max(abs(j.length) for j in jumps)
+    arm = max(abs(j.slope) for j in jumps)
+    return f"to {1e3 * length:.3g} mm" if length else f"arm only, to {1e3 * arm:.3g} mm"
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -155,7 +160,7 @@ def _muscles(found: PoseComparison, verdicts: dict[str, Verdict]) -> str:
 
     heads = (
         "<muscle", "<right", "<outcomes", "largest difference: length [m]", "velocity [m/s]", "moment arm [m/rad]",
-        "jumps MuJoCo", "jumps mjwrap",
+        "jumps of MuJoCo", "jumps of mjwrap",
     )  # fmt: skip
     return _table(heads, [row(name, s) for name, s in found.muscles.items()])
 
@@ -174,7 +179,7 @@ def _tables(tables: Sequence[TableDifference]) -> str:
     )
     rows = [
         [_text(d.muscle), d.program, _text(f"moment arm, {d.about}" if d.about else "length"), f"{d.rows}"]
-        + [f"{1e3 * x:+.4f}" for x in (d.mean, d.spread, d.largest)]
+        + [millimetres(x, 4) for x in (d.mean, d.spread, d.largest)]
         + [f"{d.time:g}"]
         for d in sorted(tables, key=lambda d: -d.spread)
     ]
@@ -255,7 +260,7 @@ def _jumps(jumps: Sequence[Jump]) -> str:
     return _table(
         ("<jump of", "<at", "length [mm]", "moment arm [mm]", "<before", "<after"),
         [
-            [_text(j.program), _text(j.where), f"{1e3 * j.length:+.3f}", f"{-1e3 * j.slope:+.3f}",
+            [_text(j.program), _text(j.where), millimetres(j.length), millimetres(-j.slope),
              _text(j.before), _text(j.after)]
             for j in sorted(jumps, key=lambda j: (j.program, -abs(j.length)))
         ],
@@ -283,12 +288,15 @@ def _left_out(found: PoseComparison) -> str:
     return f"<h2>Not compared</h2><ul>{items}</ul>"
 
 
-def _key() -> str:
-    """Return what the colours mean."""
+def _key(found: PoseComparison) -> str:
+    """Return what the colours mean, of the outcomes that were seen."""
     spots = "".join(
-        f"<li><span class='spot' style='background:{COLOURS[o]}'></span>{TITLES[o]}</li>" for o in Outcome
+        f"<li><span class='spot' style='background:{COLOURS[o]}'></span>{TITLES[o]}: {found.total(o)}</li>"
+        for o in Outcome
+        if found.total(o)
     )
     return (
-        f"<h2>Outcomes</h2><ul class='key'>{spots}</ul><p>Two true geodesics count as equal where length, velocity and "
-        f"moment arm agree to {AGREE:g}. Every path is judged by its own geometry.</p>"
+        f"<ul class='key'>{spots}</ul><p class='dim'>Poses of all muscles by outcome. In the bars a few poses are as "
+        "wide as it takes to see them. Two true geodesics count as equal where length, velocity and moment arm agree "
+        f"to {AGREE:g}; every path is judged by its own geometry.</p>"
     )

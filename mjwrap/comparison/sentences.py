@@ -12,7 +12,11 @@ from mjwrap.wording import counted
 
 
 class Verdict(NamedTuple):
-    """right: "both", "mjwrap", "MuJoCo", "neither" or "-" (nothing to compare); why: in words."""
+    """Which program is right, and why.
+
+    right: "both", "mjwrap", "MuJoCo", "neither", "-" (nothing to compare), or "mjwrap in motion": both are at every
+    pose by itself, but from pose to pose MuJoCo's path jumps; why: in words.
+    """
 
     right: str
     why: str
@@ -43,9 +47,13 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
         longer = "longer" if summary.longer_branch > 0.0 else "shorter"
         parts.append(
             f"at {counts[Outcome.OTHER_BRANCH.name]} of {poses} poses the two go round the cylinder another way, each "
-            f"a true geodesic (mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer})"
+            f"a true geodesic there (mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer}): MuJoCo "
+            "chooses the side anew at every pose, mjwrap keeps it along a sweep, as a string cannot pass through the "
+            "cylinder"
         )
-    right = "mjwrap" if counts[Outcome.MUJOCO_NOT_GEODESIC.name] or native_jumps else "both"
+    right = "mjwrap in motion" if native_jumps else "both"
+    if counts[Outcome.MUJOCO_NOT_GEODESIC.name]:
+        right = "mjwrap"
     if counts[Outcome.AGREE.name]:
         length, velocity, arm = summary.agreement
         parts.append(
@@ -102,6 +110,11 @@ def _jumps(jumps: Sequence[Jump], program: str) -> str:
         return ""
     length, slope = max(abs(jump.length) for jump in own), max(abs(jump.slope) for jump in own)
     alone, often = sum(jump.alone for jump in own), counted(len(own), "time")
+    arm = f"by up to {1e3 * slope:.3g} mm"
     if alone:
         often += f" ({alone if alone < len(own) else 'all'} with a coupled joint moved alone)"
-    return f"{program} jumps {often}, by up to {1e3 * length:.3g} mm and {1e3 * slope:.3g} mm/rad"
+    if not length:
+        return f"{program}'s moment arm (not its length) jumps {often}, {arm}"
+    return f"{program} jumps {often}, by up to {1e3 * length:.3g} mm" + (
+        f", its moment arm {arm}" if slope else ""
+    )
