@@ -26,7 +26,8 @@ import mujoco
 
 from mjwrap import MuscleSystem, Table, read_table
 from mjwrap.cli.arguments import add_model, at_least, not_negative
-from mjwrap.cli.compare_files import PoseTable, as_values, tell_motion, tell_poses, tell_tables
+from mjwrap.cli.compare_files import as_values, tell_motion, tell_poses, tell_tables
+from mjwrap.cli.compare_rows import PoseRows, write_tables
 from mjwrap.cli.errors import FAULTS, UserError
 from mjwrap.cli.models import load, start_keyframe, start_state
 from mjwrap.cli.output import Report, add_json, open_output
@@ -40,7 +41,9 @@ from mjwrap.comparison import (
     verdict,
     with_native_laws,
 )
+from mjwrap.comparison.tables import Beside
 from mjwrap.excitation import Excitation
+from mjwrap.mjcf import dof_names
 from mjwrap.wording import counted
 
 
@@ -86,7 +89,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
     add("--report", metavar="FILE.html", help="a page with a table of all muscles, plots and verdicts")
-    add("--csv", metavar="FILE.csv", help="a row for every muscle and pose")
+    add("--csv", metavar="FILE.csv", help="a row for every muscle and pose that tells something; with tables of "
+        "another program FILE_tables.csv too")  # fmt: skip
+    add(
+        "--csv-all",
+        action="store_true",
+        help="a row for every muscle and pose: hundreds of MB for a whole arm",
+    )
     add_json(parser, "all figures")
     add("--check", action="store_true", help="exit code 1 where mjwrap is not right")
 
@@ -101,13 +110,18 @@ def execute(options: argparse.Namespace) -> int:
     Excitation(muscles, options.excitation, options.seed)  # so that a mistake in it shows before the work
     plot = open_output(options.plot, "--plot", ".png", ".pdf", ".svg") if options.plot else None
     page = open_output(options.report, "--report", ".html", ".htm") if options.report else None
+    if options.csv_all and not options.csv:
+        raise UserError("--csv-all says what a table holds: it goes with --csv")
     table = open_output(options.csv, "--csv", ".csv") if options.csv else None
     report = Report(options.json)
     given = read_tables(options, model, muscles, start)
     if plot is not None or page is not None:
         need_matplotlib()
-    tables = compare_tables(model, *given) if given is not None else []
-    rows = PoseTable(table) if table is not None else None
+    beside: list[Beside] = []
+    tables = compare_tables(model, *given, each=beside.append) if given is not None else []
+    if table is not None and given is not None:
+        write_tables(open_output(tables_path(options.csv), "--csv", ".csv"), beside)
+    rows = PoseRows(table, dof_names(model), options.csv_all) if table is not None else None
     found = compare_all(model, names, options, start, rows)
     verdicts = {
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
@@ -117,8 +131,7 @@ def execute(options: argparse.Namespace) -> int:
         f"{options.model}: {counted(len(found.muscles), 'muscle')} at {counted(found.poses, 'pose')} each"
     )
     tell_poses(report.say, found, verdicts)
-    if rows is not None:
-        rows.close()
+    told = {"csv": f" ({rows.close()})"} if rows is not None else {}
 
     tell_tables(report.say, tables)
     motion = None
@@ -136,13 +149,21 @@ def execute(options: argparse.Namespace) -> int:
 
         command = shlex.join(["mjwrap", "compare", *options.given])
         write_page(page, options.model, command, found, verdicts, motion, tables)
-    for what, path in (("plot", options.plot), ("report", options.report), ("csv", options.csv)):
+    files = {"plot": options.plot, "report": options.report, "csv": options.csv}
+    if options.csv and given is not None:
+        files["tables"] = tables_path(options.csv)
+    for what, path in files.items():
         if path:
-            report.say(f"{what + ':':10s} {path}")
+            report.say(f"{what + ':':10s} {path}{told.get(what, '')}")
     asked = {name: getattr(options, name) for name in ("model", "samples", "bases", "seed")}
     report.finish({**asked, **as_values(found, verdicts, motion), "tables": [vars(d) for d in tables]})
     wrong = found.at_fault or any(jump.program == "mjwrap" for jump in found.jumps)
     return FAULTS if options.check and wrong else 0
+
+
+def tables_path(path: str) -> str:
+    """Return the name of the file beside `--csv` that the given tables go to."""
+    return str(Path(path).with_name(f"{Path(path).stem}_tables.csv"))
 
 
 Given = tuple[Any, Any, Table | None, dict[str, Table]]  # time, qpos, lengths, moment arms by joint
@@ -170,7 +191,7 @@ def read_tables(
 
 def compare_all(
     model: mujoco.MjModel, names: list[str] | None, options: argparse.Namespace, start: mujoco.MjData,
-    rows: PoseTable | None,
+    rows: PoseRows | None,
 ) -> PoseComparison:  # fmt: skip
     """Compare at all poses, with a progress bar."""
     with contextlib.closing(Stages("motions", "comparing")) as progress:

@@ -1,8 +1,7 @@
-"""A comparison as text, as values, and as rows of a table."""
+"""A comparison as text and as values."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -20,10 +19,7 @@ from mjwrap.comparison import (
     TableDifference,
     Verdict,
 )
-from mjwrap.comparison.geometry import Fault
-from mjwrap.comparison.twins import Batch
-from mjwrap.comparison.verdict import Extreme, differences, outcomes
-from mjwrap.output import PartFile
+from mjwrap.comparison.verdict import Extreme
 from mjwrap.wording import counted
 
 TITLES = {
@@ -36,41 +32,7 @@ TITLES = {
     Outcome.UNEXPLAINED: "unexplained",
     Outcome.WRONG_SIDE: "wrong side",
 }
-_HEADER = (
-    "motion", "at", "muscle", "outcome", "length_mujoco", "length_mjwrap", "velocity_mujoco", "velocity_mjwrap",
-    "moment_arm_difference", "fault_mujoco", "fault_mjwrap", "status_mjwrap",
-)  # fmt: skip
-
-
 Say = Callable[[str], object]
-
-
-class PoseTable:
-    """A CSV file with a row for every muscle and pose, written while they are compared. SI units."""
-
-    def __init__(self, output: PartFile) -> None:
-        self._output = output
-        self._writer = csv.writer(output.open_text())
-        with output.writing():
-            self._writer.writerow(_HEADER)
-
-    def add(self, batch: Batch) -> None:
-        """Write one motion."""
-        with self._output.writing():
-            for twin in batch.twins:
-                native, mine = twin.native, twin.mjwrap
-                if mine is None:
-                    continue
-                found, gaps = outcomes(twin, batch.motion.continuous), differences(native, mine)
-                for k, at in enumerate(batch.motion.at.tolist()):
-                    row = [batch.motion.name, at, twin.name, Outcome(int(found[k])).name]
-                    row += [float(x[k]) for x in (native.length, mine.length, native.velocity, mine.velocity)]
-                    faults = [Fault(int(x.fault[k])).name for x in (native, mine)]
-                    self._writer.writerow([*row, float(gaps[2, k]), *faults, int(twin.status[k])])
-
-    def close(self) -> None:
-        """Finish the file and give it its name."""
-        self._output.publish()
 
 
 def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) -> None:

@@ -7,8 +7,9 @@ with and without its mean.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -45,33 +46,51 @@ class TableDifference:
     table: float
 
 
+class Beside(NamedTuple):
+    """A column of a table, and what both programs have there, (T,) each: nan where one has no path.
+
+    about: the joint of the moment arms [m], or "" for lengths [m].
+    """
+
+    muscle: str
+    about: str
+    time: Array
+    table: Array
+    mujoco: Array
+    mjwrap: Array
+
+
 def compare_tables(
     model: mujoco.MjModel,
     time: Array,
     qpos: Array,
     lengths: Table | None = None,
     moment_arms: Mapping[str, Table] | None = None,
+    *,
+    each: Callable[[Beside], object] | None = None,
 ) -> list[TableDifference]:
     """Return how far MuJoCo's tendons and mjwrap's paths are from tables, muscle by muscle.
 
     time (T,), qpos (T, nq): the motion; a table's rows are looked up in it, with straight lines between. Columns are
     muscles, a path before the name is left out, and so are the marks of `mjwrap run --columns`; moment_arms: by the
-    joint's name, positive where the muscle's tension increases the coordinate. A tendon that only holds a place for
+    joint's name, positive where the muscle's tension increases the coordinate; each: called with the curves of every
+    muscle in the tables. A tendon that only holds a place for
     another route is not compared. Raises `TableError` where a table has none of the muscles, or rows outside the
     motion.
     """
     model = pristine(model)
     found: list[TableDifference] = []
     if lengths is not None:
-        found += _compare(model, time, qpos, lengths, "")
+        found += _compare(model, time, qpos, lengths, "", each)
     for joint, table in (moment_arms or {}).items():
-        found += _compare(model, time, qpos, table, joint)
+        found += _compare(model, time, qpos, table, joint, each)
     return found
 
 
 def _compare(
-    model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str
-) -> list[TableDifference]:
+    model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str,
+    each: Callable[[Beside], object] | None,
+) -> list[TableDifference]:  # fmt: skip
     dof = _dof(model, joint) if joint else -1
     muscles = MuscleSystem(model)
     known = [*muscles.names, *muscles.native]
@@ -100,6 +119,11 @@ def _compare(
         for i, name in enumerate(muscles.names):
             if status[i] == 0:
                 values["mjwrap", name][k] = own_length[i] if dof < 0 else -own_jacobian[i, dof]
+    absent = np.full(len(poses), np.nan)
+    for name in known:
+        if name in columns and each is not None:
+            both = [values.get((program, name), absent) for program in ("MuJoCo", "mjwrap")]
+            each(Beside(name, joint, table.time, columns[name], *both))
     told = [
         _difference(name, program, joint, table.time, value, columns[name])
         for (program, name), value in values.items()
