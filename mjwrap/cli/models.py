@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -63,7 +64,7 @@ def start_state(model: mujoco.MjModel, key: int, positions: Sequence[str] = ()) 
 
 
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Sequence[str]) -> None:
-    """Put data where `start_state` begins."""
+    """Put data where `start_state` begins; warn of positions outside a joint's range."""
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
     for entry in positions:
@@ -71,7 +72,14 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: S
         if not equals:
             raise UserError(f"--qpos '{entry}': write JOINT=VALUE, such as {entry}=0.5 [rad or m]")
         joint = find_joint(model, name, entry)
-        data.qpos[model.jnt_qposadr[joint]] = number(text, f"'{entry}'")
+        value = number(text, f"'{entry}'")
+        data.qpos[model.jnt_qposadr[joint]] = value
+        low, high = model.jnt_range[joint]
+        if model.jnt_limited[joint] and not low <= value <= high:
+            unit = "m" if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
+            warnings.warn(
+                f"'{entry}' lies outside the joint's range, {low:g} to {high:g} {unit}", stacklevel=2
+            )
 
 
 def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:

@@ -27,6 +27,7 @@ import contextlib
 import math
 import sys
 import time
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -54,6 +55,13 @@ from mjwrap.files import SUFFIXES
 from mjwrap.output import uninterrupted
 from mjwrap.recording import Server, serve
 from mjwrap.wording import counted
+
+
+class Spent(NamedTuple):
+    """Wall time [s]: of the simulation, and of sampling, drawing and writing it."""
+
+    simulation: float
+    outputs: float
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -136,12 +144,15 @@ def execute(options: argparse.Namespace) -> int:
                 logs, closes = open_outputs(options, engine, outputs, server.connect if server else "")
             begin(engine, excitation, prescribed)
             with Interrupt() as interrupt:
-                wall = advance(engine, excitation, prescribed, options, logs, interrupt)
+                spent = advance(engine, excitation, prescribed, options, logs, interrupt)
+                closing = time.perf_counter()
                 for close in closes:
                     close()
                 outputs.close()
-        tell(report, options, engine, wall)
-        report.finish(facts(options, engine, wall, interrupt.asked))
+        if logs:
+            spent = spent._replace(outputs=spent.outputs + time.perf_counter() - closing)
+        tell(report, options, engine, spent)
+        report.finish(facts(options, engine, spent, interrupt.asked))
         if interrupt.asked:
             name = interrupt.asked.name
             print(f"mjwrap run: stopped by {name}; the files hold what was simulated", file=sys.stderr)
@@ -177,17 +188,17 @@ def begin(engine: Engine, excitation: Excitation, prescribed: Prescribed) -> Non
 def advance(
     engine: Engine, excitation: Excitation, prescribed: Prescribed, options: argparse.Namespace, logs: list[Log],
     interrupt: Interrupt,
-) -> float:  # fmt: skip
-    """Run for the asked duration or until it is to stop; return the wall time [s]."""
+) -> Spent:  # fmt: skip
+    """Run for the asked duration or until it is to stop; return the time that it took."""
     data, timestep = engine.data, float(engine.model.opt.timestep)
     steps = max(1, math.ceil(options.duration / timestep - 1e-6))
     stride = max(1, round(options.sample / timestep))
-    started = time.perf_counter()
+    started, outputs = time.perf_counter(), 0.0
     bar = progress_bar(steps * timestep, "s", "simulating")
     try:
         for k in range(steps):
             if k % stride == 0:
-                sample(engine, logs)
+                outputs += sample(engine, logs)
                 bar.update(0.0 if k == 0 else stride * timestep)
             if interrupt.asked:
                 break
@@ -196,29 +207,31 @@ def advance(
             prescribed.place(data)
             excitation.write(data)
         else:
-            sample(engine, logs)
+            outputs += sample(engine, logs)
     finally:
         bar.close()
-    return time.perf_counter() - started
+    return Spent(time.perf_counter() - started - outputs, outputs)
 
 
-def sample(engine: Engine, logs: list[Log]) -> None:
-    """Log the present state, muscles included."""
+def sample(engine: Engine, logs: list[Log]) -> float:
+    """Log the present state, muscles included; return the time [s] that it took."""
+    started = time.perf_counter()
     if logs:
         engine.look()
         for log in logs:
             log(engine.seen)
+    return time.perf_counter() - started
 
 
-def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: float) -> None:
+def tell(report: Report, options: argparse.Namespace, engine: Engine, spent: Spent) -> None:
     """Say what was run, how fast, what went wrong, and where the files are."""
     muscles, simulated = engine.muscles, engine.data.time
     mode = "" if options.mode == MODES[0] else f", plugin mode {options.mode}"
     step = f"{_integrator(engine.model)}, time step {1e3 * engine.model.opt.timestep:g} ms"
     report.say(f"{options.model}: {counted(muscles.n, 'muscle')}, {step}{mode}")
-    report.say(
-        f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
-    )
+    wall = spent.simulation
+    rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
+    report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
     if not muscles.n and not muscles.native:
         report.say("the model declares no muscle that mjwrap could drive; only MuJoCo moved it")
     if muscles.native:
@@ -236,7 +249,7 @@ def tell(report: Report, options: argparse.Namespace, engine: Engine, wall: floa
 
 
 def facts(
-    options: argparse.Namespace, engine: Engine, wall: float, stopped: Stopped | None
+    options: argparse.Namespace, engine: Engine, spent: Spent, stopped: Stopped | None
 ) -> dict[str, object]:
     """Return the same as values."""
     return {
@@ -249,7 +262,8 @@ def facts(
         "integrator": _integrator(engine.model),
         "timestep": float(engine.model.opt.timestep),
         "simulated": float(engine.data.time),
-        "wall": wall,
+        "wall": spent.simulation,
+        "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,
         "paths_not_found": engine.failures(),
         "files": {what: getattr(options, option) for what, option in OUTPUTS if getattr(options, option)},

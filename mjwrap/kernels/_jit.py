@@ -24,7 +24,11 @@ from mjwrap.kernels._kernel import Apart, Hidden, Kernel
 config: Any = numba_config  # its variables, set from the environment, are not known to type checkers
 F = TypeVar("F", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
-_NOTICE = "mjwrap: compiling its kernels, once for this machine and version (about half a minute) ..."
+_NOTICE = "mjwrap: compiling its kernels, once for this machine and version ({}) ..."
+_FIRST, _FURTHER = (
+    "about half a minute",
+    "those that nothing has asked for so far; mjwrap warmup compiles all at once",
+)
 
 
 def source_hash() -> str:
@@ -86,7 +90,8 @@ class _Announcer(event.Listener):
         function = getattr(dispatcher, "py_func", None)
         if not self.silent and getattr(function, "__module__", "").startswith("mjwrap.kernels."):
             self.silent = True
-            print(_NOTICE, file=sys.stderr, flush=True)
+            how = _FURTHER if any(Path(_CACHE).rglob("*.nbi")) else _FIRST
+            print(_NOTICE.format(how), file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
         pass
