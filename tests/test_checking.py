@@ -5,19 +5,19 @@ from typing import Any
 
 import mujoco
 import pytest
-from cli_runs import CASE2, ELBOW, ENTERS, ROOT
+from cli_runs import CASE2, ENTERS, ROOT
 
 import mjwrap as mw
 from mjwrap.checking import Checks, check_model
 
-TWO_CYLINDERS = str(ROOT / "models" / "paper_two_cylinders" / "paper_two_cylinders.xml")
+EVERY_MODEL = [str(path) for path in sorted((ROOT / "models").glob("*/*.xml"))]
 
 
 def check(path: str, poses: int = 5, samples: int = 21) -> Checks:
     return check_model(mujoco.MjModel.from_xml_path(path), poses=poses, samples=samples)
 
 
-@pytest.mark.parametrize("path", [ELBOW, CASE2, TWO_CYLINDERS])
+@pytest.mark.parametrize("path", EVERY_MODEL, ids=lambda path: path.split("/")[-1])
 def test_a_sound_model_passes_every_check(path: str) -> None:
     found = check(path)
     assert found.table().count("pass") == len(found.checks) == 10, found.table()
@@ -45,8 +45,8 @@ def failed_when(monkeypatch: pytest.MonkeyPatch, name: str, spoil: Callable[[Any
         ("forces", lambda pulls: pulls[:-1], {"balance"}),
         ("forces", lambda pulls: [(b, p, 1.001 * f) for b, p, f in pulls], {"power"}),
         ("tangency_error", lambda e: e + 2e-10, {"tangency"}),
-        ("status", lambda s: s + 1, {"paths", "virtual_work"}),
-        ("status", lambda s: s + int(mw.Status.ENDPOINT_INSIDE), {"model", "virtual_work"}),
+        ("status", lambda s: s + 1, {"paths"}),
+        ("status", lambda s: s + int(mw.Status.ENDPOINT_INSIDE), {"model"}),
     ],
 )
 def test_a_broken_law_is_noticed(

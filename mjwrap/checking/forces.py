@@ -33,7 +33,7 @@ def look_at_forces(
 ) -> None:
     """Apply the muscles' forces at the state in `data`, from a cold start, and compare.
 
-    A muscle without a path there has no last good force to hold: it pulls nothing.
+    A muscle that would hold its last good force there has none: it pulls nothing.
     """
     work, balance, power = checks
     model = muscles.model
@@ -42,7 +42,7 @@ def look_at_forces(
     data.xfrc_applied[:] = 0.0
     muscles.reset(data)
     muscles.apply(data)
-    tension, velocity, names, good = muscles.tension, muscles.velocity, muscles.names, muscles.status == 0
+    tension, velocity, names, good = muscles.tension, muscles.velocity, muscles.names, ~muscles.held
     found, parts = np.zeros(model.nv), np.zeros(model.nv)
     for body in np.flatnonzero(data.xfrc_applied.any(axis=1)):
         force, moment, each = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:], np.zeros(model.nv)
