@@ -9,6 +9,7 @@ import pytest
 from cli_runs import CASE2, ELBOW
 
 import mjwrap as mw
+from mjwrap.checking import check_model
 from mjwrap.comparison import (
     Outcome,
     PoseComparison,
@@ -223,19 +224,24 @@ def test_a_fault_of_mjwrap_is_put_to_mjwrap(
 
 
 def test_a_jump_of_mjwrap_is_found_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Comparer.mjwrap_at
+    """Where `mjwrap check` finds it, too: both walk alike."""
+    sound = mw.MuscleSystem.length
 
-    def torn(self: Comparer, qpos: np.ndarray, qvel: np.ndarray) -> object:
-        length, *rest = sound(self, qpos, qvel)
-        return length + 1e-4 * (qpos[0] > 0.00123), *rest
+    def torn(self: mw.MuscleSystem) -> np.ndarray:
+        assert sound.fget is not None
+        length: np.ndarray = sound.fget(self)
+        return length + 1e-4 * (self._last.scratch.qpos[0] > 0.00123)
 
-    monkeypatch.setattr(Comparer, "mjwrap_at", torn)
+    monkeypatch.setattr(mw.MuscleSystem, "length", property(torn))
     found = compare_poses(mujoco.MjModel.from_xml_path(CASE2), samples=51)
     (jump,) = found.jumps
     assert (jump.program, jump.muscle, jump.sweep) == ("mjwrap", "muscle", "cylinder_y")
     assert jump.at == pytest.approx(0.00123, abs=1e-9)
     assert jump.length == pytest.approx(1e-4, rel=1e-6)
     assert "mjwrap jumps 1 time, by up to 0.1 mm" in only(found)[1]
+    checks = check_model(mujoco.MjModel.from_xml_path(CASE2), poses=1, samples=51)
+    (told,) = next(check for check in checks.checks if check.name == "jumps").remarks
+    assert "cylinder_y = 0.001230: length +0.100 mm" in told
 
 
 def test_muscles_that_cannot_be_compared_say_why() -> None:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mjwrap.comparison.geometry import Fault
 from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
 from mjwrap.comparison.verdict import slope
-from mjwrap.continuity import NARROW, Probe, odd_intervals, refine_jump
+from mjwrap.continuity import NARROW, odd_intervals, refine_jump
 from mjwrap.poses import Motion, PoseMaker
+from mjwrap.walking import Found, Place
 from mjwrap.wording import counted
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,30 +44,16 @@ class Jump:
 def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, axis: int = 0) -> list[Jump]:
     """Return the jumps of both programs along a sweep of one joint that has been evaluated."""
     motion, place = batch.motion, poses.maker(joint, axis)
-    found: list[Jump] = []
+    span, found = float(np.ptp(motion.at)), list[Jump]()
+    mine = [twin.index for twin in batch.twins if twin.mjwrap is not None]
+    own = comparer.walker.jumps(place, batch.walk, mine)
     for twin in batch.twins:
-        for program, record in (("MuJoCo", twin.native), ("mjwrap", twin.mjwrap)):
-            if record is None:
-                continue
-            good = np.ones(len(motion.at), dtype=np.bool_) if program == "MuJoCo" else twin.status == 0
-            seen: list[float] = []
-            for k, bend in odd_intervals(motion.at, record.length, slope(record, motion), good):
-                probe = (
-                    _native_probe(comparer, twin, place)
-                    if program == "MuJoCo"
-                    else _mjwrap_probe(comparer, twin, place, motion, k, poses.base)
-                )
-                ends = float(motion.at[k]), float(motion.at[k + 1])
-                jump = refine_jump(probe, *ends, float(np.ptp(motion.at)), bend)
-                if jump is None or any(abs(jump[0] - other) < 1e-6 for other in seen):
-                    continue
-                seen.append(jump[0])
-                before, after = _sides(comparer, twin, program, place, jump[0], float(np.ptp(motion.at)))
-                found.append(
-                    Jump(
-                        program, twin.name, motion.name, *jump, before, after, motion.base, alone=motion.alone
-                    )
-                )
+        told = [("MuJoCo", jump) for jump in _native_jumps(comparer, twin, place, motion)]
+        told += [("mjwrap", jump) for i, jump in own if i == twin.index]
+        for program, jump in told:
+            before, after = _sides(comparer, twin, program, place, jump[0], span)
+            told_as = program, twin.name, motion.name, *jump, before, after, motion.base
+            found.append(Jump(*told_as, alone=motion.alone))
     return [_beside(jump, found, batch) for jump in found]
 
 
@@ -86,50 +69,34 @@ def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
     return replace(jump, other_smooth=has_path and not jumps_too)
 
 
-def _native_probe(comparer: Comparer, twin: Twin, place: Callable[[float], tuple[Array, Array]]) -> Probe:
+def _native_jumps(comparer: Comparer, twin: Twin, place: Place, motion: Motion) -> list[Found]:
+    """Return the jumps of MuJoCo's tendon, whose path depends on the pose alone."""
+
     def probe(at: float) -> tuple[float, float]:
         qpos, tangent = place(at)
         length, _, jacobian = comparer.native_at(qpos, np.zeros_like(tangent))
         return float(length[twin.tendon]), float(jacobian[twin.tendon] @ tangent)
 
-    return probe
-
-
-def _mjwrap_probe(
-    comparer: Comparer,
-    twin: Twin,
-    place: Callable[[float], tuple[Array, Array]],
-    motion: Motion,
-    k: int,
-    base: Array,
-) -> Probe:
-    """Return a probe that comes to every place from sample k, on the branch that the sweep had there."""
-    assert twin.mjwrap is not None
-    still = np.zeros(motion.tangent.shape[1])
-    comparer.muscles.reset(comparer.data)
-    cold = comparer.mjwrap_at(motion.qpos[k], still)[0][twin.index]
-    same_branch = abs(cold - twin.mjwrap.length[k]) < 1e-9
-
-    def probe(at: float) -> tuple[float, float]:
-        comparer.muscles.reset(comparer.data)
-        if same_branch:
-            comparer.mjwrap_at(motion.qpos[k], still)
-        else:
-            comparer.walk(base, motion.qpos[0])
-            for qpos in motion.qpos[: k + 1]:
-                comparer.mjwrap_at(qpos, still)
-        qpos, tangent = place(at)
-        length, _, jacobian, _ = comparer.mjwrap_at(qpos, still)
-        return float(length[twin.index]), float(jacobian[twin.index] @ tangent)
-
-    return probe
+    found: list[Found] = []
+    length, slopes, good = (
+        twin.native.length,
+        slope(twin.native, motion),
+        np.ones(len(motion.at), dtype=np.bool_),
+    )
+    for k, bend in odd_intervals(motion.at, length, slopes, good):
+        jump = refine_jump(
+            probe, float(motion.at[k]), float(motion.at[k + 1]), float(np.ptp(motion.at)), bend
+        )
+        if jump is not None and all(abs(jump[0] - other[0]) >= 1e-6 for other in found):
+            found.append(jump)
+    return found
 
 
 def _sides(
     comparer: Comparer,
     twin: Twin,
     program: str,
-    place: Callable[[float], tuple[Array, Array]],
+    place: Place,
     at: float,
     span: float,
 ) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from mjwrap.comparison.geometry import ANGLE, HELD, Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
 from mjwrap.poses import Motion
 from mjwrap.system import MuscleSystem
+from mjwrap.walking import Walk, Walker
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,9 +69,10 @@ class Twin:
 
 @dataclass
 class Batch:
-    """All compared muscles over one motion."""
+    """All compared muscles over one motion; walk: all of mjwrap's."""
 
     motion: Motion
+    walk: Walk
     twins: list[Twin] = field(default_factory=list)
 
 
@@ -91,6 +93,7 @@ class Comparer:
         self._native_data = mujoco.MjData(self._native)
         mujoco.mj_kinematics(self._native, self._native_data)
         self.data = mujoco.MjData(self.model)
+        self.walker = Walker(muscles, self.data)
         self.left_out: dict[str, str] = {}
         self._pairs: list[_Pair] = []
         for name in wanted:
@@ -127,9 +130,10 @@ class Comparer:
         contacts: list[dict[int, Array]] = []
         geoms = _Frames(count, self.model)
         taken = [pair.index for pair in self._pairs if pair.index >= 0]
+        branches: list[Array] = []
         self.muscles.reset(self.data)
         if motion.continuous and start is not None:
-            self.walk(start, motion.qpos[0])
+            self.walker.come(start, motion.qpos[0])
         for k in range(count):
             native.keep(k, *self.native_at(motion.qpos[k], motion.qvel[k]))
             wraps.keep(k, self._native_data)
@@ -138,7 +142,9 @@ class Comparer:
                 self.muscles.reset(self.data)
             mine.keep(k, *self.mjwrap_at(motion.qpos[k], motion.qvel[k]))
             contacts.append({i: self.muscles.contact_points(i) for i in taken})
-        batch = Batch(motion)
+            branches.append(self.muscles.branch(self.data))
+        slopes = np.einsum("tnv,tv->tn", mine.jacobian, motion.tangent)
+        batch = Batch(motion, Walk(motion.at, mine.length, slopes, mine.status == 0, branches))
         for name, index, tendon, spans in self._pairs:
             points = wraps.points(tendon, spans)
             record = self._record(spans, points, geoms, HELD, *native.of(tendon))
@@ -152,16 +158,6 @@ class Comparer:
                 )
             batch.twins.append(Twin(name, index, tendon, spans, record, own_record, status))
         return batch
-
-    def walk(self, start: Array, goal: Array, steps: int = 20) -> None:
-        """Take mjwrap from one pose to another, so that it keeps its branch."""
-        difference = np.zeros(self.model.nv)
-        mujoco.mj_differentiatePos(self.model, difference, 1.0, start, goal)
-        for k in range(steps):
-            qpos = start.copy()
-            mujoco.mj_integratePos(self.model, qpos, difference, k / steps)
-            self.data.qpos[:] = qpos
-            self.muscles.forward(self.data)
 
     def native_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array]:
         """Return MuJoCo's tendon lengths (ntendon,), velocities and ten_J (ntendon, nv) at a state."""
