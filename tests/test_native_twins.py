@@ -94,6 +94,7 @@ def test_path_and_force_are_mujocos(route: str, actuator: str) -> None:
         rel = 1e-4 if holds(route) else 1e-10  # the force-velocity curve is steep: 1e-6 m/s in 0.1 m/s
         assert muscles.tension == pytest.approx(-gear * twin.actuator_force, rel=rel, abs=1e-9)
         contacts, drawn = muscles.contact_points(0), muscles.points(0)
+        drawn = drawn[~np.isnan(drawn[:, 0])]  # between routes
         touched.add(len(contacts))
         for point in contacts.reshape(-1, 3):
             assert np.linalg.norm(drawn - point, axis=1).min() < 1e-14
