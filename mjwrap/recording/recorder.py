@@ -28,8 +28,9 @@ class Recorder(RunLog):
     the engine plugin moves; `path` a file name that ends in .rrd. `connect` streams to a running viewer, beside the
     file or instead of it: True to one on this machine, or an address (rerun+http://HOST:PORT/proxy).
 
-    `rate` [Hz] states per second of simulated time are recorded (None: one at every `log`): length [m], lengthening
-    speed [m/s], tension [N], activation, power [W], fibre length [m], solver status and iterations of every muscle.
+    `rate` [Hz] states per second of simulated time are recorded, beside those of frames (None: one at every `log`):
+    length [m], lengthening speed [m/s], tension [N], activation, power [W], fibre length [m], solver status and
+    iterations of every muscle.
     Bodies, paths, contact points, forces and moment arms are taken `path_rate` times [Hz]. `groups` says whose curves
     stand together, {name: patterns of muscle names} (None: by the body that they move). `force_scale` [m/N] is the
     length of an arrow (None: the strongest muscle's is three tenths of the size of all paths). `flush_every` states are
