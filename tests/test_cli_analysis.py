@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_runs import ELBOW, run_here
+from cli_runs import ELBOW, said, run_here
 
 import mjwrap as mw
 
@@ -17,7 +17,7 @@ def made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     """A folder with the states and the analysis of a run of the elbow."""
     files = ["--out", tmp_path / "states.sto", "--analysis", tmp_path / "e"]
     ran = run_here("run", capsys, ELBOW, "--duration", 0.2, "--excitation", "pulses:0.5,0.2", *files)
-    assert (ran.code, ran.err) == (0, "")
+    assert (ran.code, said(ran)) == (0, [])
     kinds = ("FiberLength", "Length", "MomentArm_elbow_flexion", "TendonForce")
     found = sorted(path.name for path in tmp_path.glob("e_*"))
     assert found == [f"e_MuscleAnalysis_{kind}.sto" for kind in kinds]
