@@ -1,10 +1,12 @@
 """The code in README.md and docs/ runs, and prints what the page says that it prints.
 
 The python fences of a page run in order and share their names. A fence after a comment `<!-- no-test: reason -->` is
-not run. A `text` fence right below a python fence is what that one prints, numbers to 1e-9 relative or 1e-12 absolute:
-digits beyond differ between processors.
+not run, but read: it compiles and names what exists. A `text` fence right below a python fence is what that one
+prints, numbers to 1e-9 relative or 1e-12 absolute: digits beyond differ between processors. An `xml` fence compiles in
+the model that it is written for. For command lines there is test_doc_commands.py.
 """
 
+import ast
 import contextlib
 import io
 import math
@@ -12,7 +14,10 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
+import mujoco
 import pytest
+
+import mjwrap as mw
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -45,10 +50,18 @@ def snippets(text: str) -> list[Snippet]:
         exempt = _NO_TEST.search(before)
         if exempt:
             assert exempt["reason"], "a no-test comment gives its reason"
+            named(fence["body"])
             continue
         found.append(Snippet(fence["body"], before.count("\n") + 1, None))
         last_end = fence.end()
     return found
+
+
+def named(code: str) -> None:
+    """Read code that is not run: it compiles, and what it takes from `mw` exists."""
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "mw":
+            assert hasattr(mw, node.attr), f"mjwrap has no '{node.attr}'"
 
 
 def same(expected: str, printed: str) -> bool:
@@ -104,3 +117,47 @@ def test_an_error_names_the_line_of_the_page() -> None:
     with pytest.raises(ZeroDivisionError) as caught:
         run("page", "title\n\n```python\n\n1 / 0\n```\n")
     assert caught.traceback[-1].lineno + 1 == 5
+
+
+def test_code_that_is_not_run_names_what_exists() -> None:
+    page = "<!-- no-test: needs a screen -->\n```python\nimport mjwrap as mw\n\nmw.{}\n```\n"
+    assert snippets(page.format("Video")) == []
+    with pytest.raises(AssertionError, match="no 'Vidio'"):
+        snippets(page.format("Vidio"))
+
+
+def test_every_fence_is_of_a_language_that_is_tested() -> None:
+    marks = {(page.name, fence["language"]) for page in PAGES for fence in _FENCE.finditer(page.read_text())}
+    assert {mark for mark in marks if mark[1] not in ("python", "text", "sh", "xml")} == set()
+
+
+# What each page's XML is a part of: the fence's place is marked.
+_ANKLE = """<mujoco><worldbody><site name="origin"/><body><joint/><geom size=".1"/>
+<site name="insertion" pos="0 0 1"/></body></worldbody>
+<tendon><spatial name="soleus"><site site="origin"/><site site="insertion"/></spatial></tendon>
+<actuator>{}</actuator></mujoco>"""
+
+
+def test_xml_fences_compile_in_their_models() -> None:
+    found = {
+        page.name: fence["body"]
+        for page in PAGES
+        for fence in _FENCE.finditer(page.read_text())
+        if fence["language"] == "xml"
+    }
+    assert set(found) == {"declaring.md", "muscles.md"}, "say here what another page's XML is a part of"
+    model = mujoco.MjModel.from_xml_string(_ANKLE.format(found["muscles.md"]))
+    assert (model.na, model.actuator("soleus").dyntype.item()) == (2, mujoco.mjtDyn.mjDYN_USER)
+    elbow = re.sub(
+        r"<custom>.*?</custom>", "", (ROOT / "models/elbow/elbow.xml").read_text(), flags=re.DOTALL
+    )
+    muscles = mw.MuscleSystem(
+        mujoco.MjModel.from_xml_string(elbow.replace("</mujoco>", found["declaring.md"] + "</mujoco>"))
+    )
+    law = muscles.declarations[muscles.index("TRIlat")].parameters
+    assert isinstance(law, mw.DeGrooteFregly2016)
+    assert (law.max_isometric_force, law.optimal_fiber_length, law.tendon_slack_length) == (
+        624.3,
+        0.1138,
+        0.098,
+    )
