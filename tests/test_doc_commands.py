@@ -207,9 +207,14 @@ def test_a_wrong_command_line_is_noticed(text: str, monkeypatch: pytest.MonkeyPa
 
 
 def cheap(line: Line) -> bool:
-    """Whether a line is a run of `mjwrap` on a model of this repository, with no film or window."""
+    """Whether a line is a run of `mjwrap` on a model of this repository, with no window and no other run before it."""
     words = shlex.split(line.text)
     if words[0] != "mjwrap" or words[1:2] == [] or words[1] not in SHORTER or "models/" not in line.text:
+        return False
+    if {"--connect", "--serve"} & set(words):  # a viewer listens to it
+        return False
+    driven = words[words.index("--excitation") + 1] if "--excitation" in words else ""
+    if Path(driven).suffix in mw.files.SUFFIXES:  # a table that another run made
         return False
     return not BROUGHT & set(words) and (line.typed or "models/" in words[2])
 
