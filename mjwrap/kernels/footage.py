@@ -6,6 +6,7 @@ starts (T, K + 1) holds the row at which each part of a frame begins, and the ro
 
 from __future__ import annotations
 
+from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.coupling import R_LO, R_MUSCLE
 from mjwrap.kernels.drawing import route_contacts, route_points
@@ -57,6 +58,17 @@ def _route_forces(c, routes, seg, seg_count, size, out, count):
         out, count, seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2],
         -size * seg[last, G_E], -size * seg[last, G_E + 1], -size * seg[last, G_E + 2], 0.0,
     )  # fmt: skip
+
+
+@jit
+def put_state(row, numbers, status, info, all_numbers, all_status, all_iterations):
+    """Write the numbers (Q, n), status (n,) and iterations (C,) of an evaluation as a row."""
+    for m in range(status.shape[0]):
+        for q in range(numbers.shape[0]):
+            all_numbers[row, q, m] = numbers[q, m]
+        all_status[row, m] = status[m]
+    for c in range(info.shape[0]):
+        all_iterations[row, c] = info[c, lay.I_ITERATIONS]
 
 
 @jit

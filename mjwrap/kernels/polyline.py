@@ -52,17 +52,13 @@ def polyline(lo, hi, ox, oy, oz, ix, iy, iz, node, spacing, out, first):
             arc = node[k, S_ARC]
             turn = arc * math.sqrt(node[k, lay.W_KP] ** 2 + node[k, lay.W_KP + 1] ** 2)
             pieces = max(int(math.ceil(arc / spacing if spacing > 0.0 else turn / TURN)), 1)
-            for i in range(pieces + 1):
-                node[k, S_ARC] = arc * i / pieces
+            px, py, pz = node[k, W_P] + ox, node[k, W_P + 1] + oy, node[k, W_P + 2] + oz
+            count = _straight(x, y, z, px, py, pz, spacing, out, count)
+            for i in range(1, pieces + 1):  # the last one leaves the row as it was
+                node[k, S_ARC] = arc if i == pieces else arc * i / pieces
                 geodesic(k, node, ox, oy, oz)
-                px, py, pz = node[k, W_Q] + ox, node[k, W_Q + 1] + oy, node[k, W_Q + 2] + oz
-                if i == 0:
-                    count = _straight(x, y, z, px, py, pz, spacing, out, count)
-                else:
-                    if count < out.shape[0]:
-                        out[count, 0], out[count, 1], out[count, 2] = px, py, pz
-                    count += 1
-                x, y, z = px, py, pz
-            node[k, S_ARC] = arc
-            geodesic(k, node, ox, oy, oz)
+                x, y, z = node[k, W_Q] + ox, node[k, W_Q + 1] + oy, node[k, W_Q + 2] + oz
+                if count < out.shape[0]:
+                    out[count, 0], out[count, 1], out[count, 2] = x, y, z
+                count += 1
     return _straight(x, y, z, ix, iy, iz, spacing, out, count) - first

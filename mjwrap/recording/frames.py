@@ -38,6 +38,7 @@ class Beat:
         self._rate = rate
         self._start: float | None = None
         self._next = -math.inf
+        self._count = 0  # the multiple that comes next
 
     @property
     def next(self) -> float:
@@ -49,14 +50,17 @@ class Beat:
         return time >= self._next
 
     def take(self, time: float) -> None:
-        """Note the row at a time; the next one is due a period later."""
-        if self._rate is None:
+        """Note the row at a time; where it was due, the next one is due a period later."""
+        if self._rate is None or time < self._next:
             return
         if self._start is None:
             self._start = time
         # whole multiples, so that rounding does not add up
-        count = math.floor((time - self._start) * self._rate + EARLY) + 1
-        self._next = self._start + (count - EARLY) / self._rate
+        self._count += 1
+        self._next = self._start + (self._count - EARLY) / self._rate
+        if time >= self._next:  # periods went by without a call
+            self._count = math.floor((time - self._start) * self._rate + EARLY) + 1
+            self._next = self._start + (self._count - EARLY) / self._rate
 
 
 class Buffers:

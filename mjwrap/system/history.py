@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels import coupling, footage, layout
+from mjwrap.kernels import coupling, footage
 from mjwrap.system.state import NUMBERS
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ class Store:
         """Grow where a frame did not fit: the first one, and one with more to draw later."""
         begin, end = int(self.starts[frame, 0]), int(self.starts[frame, -1])
         if end > len(self.rows):
-            count = 2 * len(self.rows) + (end - begin) * len(self.starts)
+            count = 2 * (
+                len(self.rows) + (end - begin) * len(self.starts)
+            )  # what is not written to costs nothing
             rows = np.empty((count, self.rows.shape[1]), dtype=np.float32)
             rows[:begin] = self.rows[:begin]
             self.rows = rows
@@ -89,9 +91,8 @@ class History:
     def put_state(self, row: int) -> None:
         """Keep the last evaluation's numbers as a row."""
         last = self._results._evaluation()
-        self._numbers[row] = last.numbers
-        self._status[row] = last.status
-        self._iterations[row] = last.info[:, layout.I_ITERATIONS]
+        kept = self._numbers, self._status, self._iterations
+        footage.put_state(row, last.numbers, last.status, last.info, *kept)
 
     def put_frame(self, frame: int, poses: mujoco.MjData, spacing: float | None) -> None:
         """Keep the last evaluation's paths and forces; poses: the data whose poses it saw (`Results.poses`).
