@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli_runs import ELBOW, said, run_here
+from cli_runs import ELBOW, run_here, said
 
 import mjwrap as mw
 

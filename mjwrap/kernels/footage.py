@@ -124,34 +124,56 @@ def put_frame(
     return point <= points.shape[0] and contact <= contacts.shape[0] and force <= forces.shape[0]
 
 
-@inlined
-def _copy(rows, first, last, out, total):
-    """Copy points first..last to out from row `total` on; return the row after them."""
-    for j in range(first, last):
-        for axis in range(3):
-            out[total, axis] = rows[j, axis]
-        total += 1
-    return total
+# Frames are read as they lie, one after the other, and written to as many places as there are parts: where[k] is the
+# next row of part k. That is kinder to the processor's caches than the other way round.
 
 
 @jit
-def gather(rows, starts, out, counts):
-    """Copy points from a store's rows (m, 3) to out, each part's one after the other over all frames; counts (K, T)."""
+def count_rows(starts, counts, where):
+    """Write how many rows parts have in frames to counts (K, T), and at which row each one begins in `out` to where."""
     total = 0
     for k in range(counts.shape[0]):
+        where[k] = total
         for t in range(counts.shape[1]):
-            first, last = starts[t, k], starts[t, k + 1]
-            counts[k, t] = last - first
-            total = _copy(rows, first, last, out, total)
+            counts[k, t] = starts[t, k + 1] - starts[t, k]
+            total += counts[k, t]
 
 
 @jit
-def gather_strips(rows, starts, routes, out, sizes, counts):
-    """Copy the strips in a store's rows, one a route, to out: by muscle, then frame, then route; return how many.
+def gather(rows, starts, where, out, counts):
+    """Copy points from a store's rows (m, 3) to out, each part's one after the other over all frames; counts (K, T)."""
+    count_rows(starts, counts, where)
+    for t in range(counts.shape[1]):
+        for k in range(counts.shape[0]):
+            to = where[k]
+            for j in range(starts[t, k], starts[t, k + 1]):
+                for axis in range(3):
+                    out[to, axis] = rows[j, axis]
+                to += 1
+            where[k] = to
 
-    Only those with points count: sizes (C T,) how many each has, counts (n, T) how many strips a muscle has in a frame.
+
+@jit
+def gather_arrows(rows, starts, where, scale, tails, vectors, counts):
+    """Turn forces of a store into arrows `scale` [m/N] long, in the order of `gather`: tails and vectors (m, 3) [m]."""
+    count_rows(starts, counts, where)
+    for t in range(counts.shape[1]):
+        for k in range(counts.shape[0]):
+            to = where[k]
+            for j in range(starts[t, k], starts[t, k + 1]):
+                for axis in range(3):
+                    vectors[to, axis] = scale * rows[j, F_FORCE + axis]
+                    tails[to, axis] = rows[j, F_AT + axis] - rows[j, F_TIP] * vectors[to, axis]
+                to += 1
+            where[k] = to
+
+
+@jit
+def list_strips(starts, routes, sizes, counts):
+    """Write the sizes of all strips with points, by muscle, then frame, then route, to sizes (C T,); return how many.
+
+    counts (n, T): how many strips a muscle has in a frame.
     """
-    total = 0
     strips = 0
     c = 0
     for m in range(counts.shape[0]):
@@ -161,25 +183,22 @@ def gather_strips(rows, starts, routes, out, sizes, counts):
         for t in range(counts.shape[1]):
             before = strips
             for r in range(lo, c):
-                first, last = starts[t, r], starts[t, r + 1]
-                if last > first:
-                    total = _copy(rows, first, last, out, total)
-                    sizes[strips] = last - first
+                if starts[t, r + 1] > starts[t, r]:
+                    sizes[strips] = starts[t, r + 1] - starts[t, r]
                     strips += 1
             counts[m, t] = strips - before
     return strips
 
 
 @jit
-def gather_arrows(rows, starts, scale, tails, vectors, counts):
-    """Turn forces of a store into arrows `scale` [m/N] long, in the order of `gather`: tails and vectors (m, 3) [m]."""
-    total = 0
-    for k in range(counts.shape[0]):
-        for t in range(counts.shape[1]):
-            first = starts[t, k]
-            counts[k, t] = starts[t, k + 1] - first
-            for j in range(first, starts[t, k + 1]):
-                for axis in range(3):
-                    vectors[total, axis] = scale * rows[j, F_FORCE + axis]
-                    tails[total, axis] = rows[j, F_AT + axis] - rows[j, F_TIP] * vectors[total, axis]
-                total += 1
+def muscle_starts(starts, routes, by_muscle):
+    """Write where each muscle's rows begin within frames to by_muscle (T, n + 1), from where each route's do."""
+    for t in range(by_muscle.shape[0]):
+        m = 0
+        for c in range(routes.shape[0]):
+            while m <= routes[c, R_MUSCLE]:
+                by_muscle[t, m] = starts[t, c]
+                m += 1
+        while m < by_muscle.shape[1]:
+            by_muscle[t, m] = starts[t, -1]
+            m += 1

@@ -77,7 +77,7 @@ class History:
         none = np.empty(0, dtype=np.int64)
         self._pairs = (none, none) if muscles is None or dofs is None else (muscles, dofs)
         self._arms = np.zeros((rows, len(self._pairs[0])))
-        self._jacobian = np.zeros((n, model.nv))
+        self._jacobian, self._where = np.zeros((n, model.nv)), np.zeros(n, dtype=np.int64)
         self._positions = np.zeros((rows, model.nbody, 3), dtype=np.float32)
         self._quaternions = np.zeros((rows, model.nbody, 4), dtype=np.float32)
         self._points, self._contacts, self._forces = (
@@ -135,15 +135,20 @@ class History:
         """
         store, routes = self._points, self._plan[0]
         out, counts = self._room(room, "points", store, frames)
-        sizes = np.empty(len(routes) * frames, dtype=np.int64)
-        count = footage.gather_strips(store.rows, store.starts, routes, out, sizes, counts)
+        sizes, starts = (
+            np.empty(len(routes) * frames, dtype=np.int64),
+            np.empty((frames, len(counts) + 1), np.int64),
+        )
+        footage.muscle_starts(store.starts, routes, starts)
+        footage.gather(store.rows, starts, self._where, out, counts)
+        count = footage.list_strips(store.starts, routes, sizes, counts)
         return out, sizes[:count], counts
 
     def contacts(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints]:
         """Return the contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
         store = self._contacts
         out, counts = self._room(room, "contacts", store, frames)
-        footage.gather(store.rows, store.starts, out, counts)
+        footage.gather(store.rows, store.starts, self._where, out, counts)
         return out, counts
 
     def arrows(self, frames: int, scale: float, room: Room | None = None) -> tuple[Singles, Singles, Ints]:
@@ -155,7 +160,7 @@ class History:
         store = self._forces
         tails, counts = self._room(room, "tails", store, frames)
         vectors, _ = self._room(room, "vectors", store, frames)
-        footage.gather_arrows(store.rows, store.starts, float(scale), tails, vectors, counts)
+        footage.gather_arrows(store.rows, store.starts, self._where, float(scale), tails, vectors, counts)
         return tails, vectors, counts
 
     def _room(self, room: Room | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
