@@ -166,6 +166,21 @@ def test_a_camera_and_an_option_are_followed(tmp_path: Path) -> None:
     assert colours == {"seen": True, "hidden": False}
 
 
+def test_a_camera_on_the_muscles_sees_all_of_the_cord_and_no_room_around_it(tmp_path: Path) -> None:
+    far = CORD.replace("<worldbody>", '<statistic extent="50"/><worldbody>')  # MuJoCo's own shows a speck
+    data = mujoco.MjData(mw.install(spec_of(far)))
+    mujoco.mj_forward(data.model, data)
+    with mw.Video(data.model, tmp_path / "run.gif", width=101, height=101, camera="muscles") as video:
+        video.log(data)
+    with Image.open(tmp_path / "run.gif") as film:
+        pixels = np.asarray(film.convert("RGB")).astype(int)
+    seen = np.argwhere((pixels[..., 0] > 150) & (pixels[..., 1] < 80))
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    assert low.min() > 0
+    assert high.max() < 100
+    assert (high - low).max() > 50
+
+
 # -------------------------------------------------------------------------------------------------- failures
 
 
@@ -178,7 +193,7 @@ def test_a_camera_and_an_option_are_followed(tmp_path: Path) -> None:
         ("run.gif", {"fps": 0.0}, "fps must be a positive number"),
         ("run.gif", {"speed": -1.0}, "speed must be a positive number"),
         ("run.gif", {"width": 0}, "width must be a number of pixels"),
-        ("run.gif", {"camera": "top"}, "no camera 'top'; cameras: front"),
+        ("run.gif", {"camera": "top"}, "no camera 'top'; cameras: front, muscles"),
         ("run.gif", {"camera": 3}, "no camera 3; cameras: front"),
         ("run.mp4", {"width": 65}, "must be even, not 65 and 48"),
     ],

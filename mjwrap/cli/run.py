@@ -96,7 +96,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="simulated seconds a second of it (default 1)",
     )
-    film("--camera", metavar="NAME", help="a camera of the model, for the film (default: all of the model)")
+    film(
+        "--camera",
+        metavar="NAME",
+        help="a camera of the model, for the film, or 'muscles', one that looks at them (default: all of the model)",
+    )
     files = parser.add_argument_group("plot and tables").add_argument
     files(
         "--plot",

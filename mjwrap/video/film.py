@@ -10,6 +10,7 @@ import mujoco
 
 from mjwrap.errors import RecordingError
 from mjwrap.output import PartFile, RunLog, require
+from mjwrap.video.camera import find_camera, look_at_muscles
 from mjwrap.video.formats import FORMATS, Writer
 from mjwrap.video.offscreen import Offscreen
 
@@ -22,7 +23,8 @@ class Video(RunLog):
     `model` is a mujoco.MjModel; the muscles of one that `install` or `load` returned are in the picture. `path` is a
     file name that ends in .mp4 or .gif, `fps` the frames per second of the film, `speed` how many simulated seconds
     pass in one of its seconds. `width` and `height` are in pixels. `camera` is the name or id of a camera of the
-    model, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model; `option` a mujoco.MjvOption.
+    model, "muscles" for one that looks at all muscles where the film begins, a mujoco.MjvCamera, or None for MuJoCo's
+    free camera on the whole model; `option` is a mujoco.MjvOption.
 
     The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
     Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
@@ -49,7 +51,8 @@ class Video(RunLog):
             require(
                 name, pixels, int(pixels) == pixels and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384"
             )
-        self._camera, self._option = _camera(model, camera), option or mujoco.MjvOption()
+        self._model, self._camera = model, find_camera(model, camera)
+        self._option = option or mujoco.MjvOption()
         self._signature = model.signature
         self._rate = fps / speed  # frames per simulated second
         self._start: float | None = None  # time of the first frame
@@ -90,9 +93,8 @@ class Video(RunLog):
         number = math.floor((time - self._start) * self._rate + EARLY)
         if number > self._number:
             self._number = number
-            self._guarded(
-                lambda: self._writer.add(self._canvas.picture(data, self._camera, self._option), number)
-            )
+            camera = self._camera = self._camera or look_at_muscles(self._model, data)
+            self._guarded(lambda: self._writer.add(self._canvas.picture(data, camera, self._option), number))
 
     @property
     def _empty(self) -> bool:
@@ -103,19 +105,3 @@ class Video(RunLog):
             raise RecordingError(f"nothing was logged to '{self._place}', so there is no film")
         self._writer.finish(self._number + 1)
         self._canvas.close()
-
-
-def _camera(model: mujoco.MjModel, camera: str | int | mujoco.MjvCamera | None) -> mujoco.MjvCamera:
-    """Return the camera meant; RecordingError lists the model's where there is no such."""
-    if isinstance(camera, mujoco.MjvCamera):
-        return camera
-    found = mujoco.MjvCamera()
-    mujoco.mjv_defaultFreeCamera(model, found)
-    if camera is None:
-        return found
-    names = [model.camera(i).name for i in range(model.ncam)]
-    number = names.index(camera) if isinstance(camera, str) and camera in names else camera
-    if isinstance(number, str) or not 0 <= number < model.ncam:
-        raise RecordingError(f"no camera {camera!r}; cameras: {', '.join(names) or 'none'}")
-    found.type, found.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), int(number)
-    return found

@@ -1,0 +1,56 @@
+"""Where a film is seen from: a camera of the model, MuJoCo's free camera, or one that looks at the muscles."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mjwrap.errors import RecordingError
+
+MUSCLES = "muscles"  # the name of the camera that looks at them, unless the model has one of that name
+ROOM = 1.5  # distance, in sizes of all muscles, at which a camera of 45 degrees has them in its picture
+ELEVATION = -12.0  # [degrees]
+
+
+def find_camera(
+    model: mujoco.MjModel, camera: str | int | mujoco.MjvCamera | None
+) -> mujoco.MjvCamera | None:
+    """Return the camera meant, None for the one on the muscles; RecordingError lists all where there is no such."""
+    if isinstance(camera, mujoco.MjvCamera):
+        return camera
+    found = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, found)
+    if camera is None:
+        return found
+    names = [model.camera(i).name for i in range(model.ncam)]
+    number = names.index(camera) if isinstance(camera, str) and camera in names else camera
+    if number == MUSCLES:
+        return None
+    if isinstance(number, str) or not 0 <= number < model.ncam:
+        raise RecordingError(f"no camera {camera!r}; cameras: {', '.join([*names, MUSCLES])}")
+    found.type, found.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), int(number)
+    return found
+
+
+def look_at_muscles(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
+    """Return a free camera on all sites of tendons and tuples at the pose of `data`, or on the whole model.
+
+    It looks along the level direction in which they are thinnest, from the side on which fewer bodies are.
+    """
+    found = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, found)
+    on_tendons = model.wrap_objid[model.wrap_type == int(mujoco.mjtWrap.mjWRAP_SITE)]
+    in_tuples = model.tuple_objid[model.tuple_objtype == int(mujoco.mjtObj.mjOBJ_SITE)]
+    sites = np.union1d(on_tendons, in_tuples)
+    points = data.site_xpos[sites]
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    if size == 0.0:
+        return found
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    level = points[:, :2] - points[:, :2].mean(axis=0)
+    along = np.linalg.eigh(level.T @ level)[1][:, 0]
+    if (data.xipos[1:, :2].mean(axis=0) - middle[:2]) @ along < 0.0:
+        along = -along
+    found.lookat[:], found.distance = middle, ROOM * size
+    found.azimuth, found.elevation = float(np.degrees(np.arctan2(along[1], along[0]))), ELEVATION
+    return found
