@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Set everything up and run it: needs Python 3.11 or newer with venv and pip, and nothing else.
 
-    python3 bootstrap.py demo               install, run the elbow, leave a recording and a plot in out/
+    python3 bootstrap.py demo               install, run the elbow, leave a recording and a plot in out/; play it
     python3 bootstrap.py test [ARGS]        install, run the tests with MuJoCo 3; ARGS go to pytest
     python3 bootstrap.py test --mujoco 4    the same with MuJoCo 4, in an environment of its own
 
@@ -151,8 +151,8 @@ def prepare(extras: "set[str]", mujoco: int) -> Path:
     return python
 
 
-def run_demo() -> int:
-    """Simulate the elbow; say where the recording and the plot are."""
+def run_demo(view: bool) -> int:
+    """Simulate the elbow; say where the recording and the plot are, and play it where somebody can look."""
     python = prepare(DEMO_EXTRAS, 3)
     (ROOT / "out").mkdir(exist_ok=True)
     arguments = [DEMO_MODEL, "--duration", "2", "--excitation", "pulses"]
@@ -168,8 +168,17 @@ def run_demo() -> int:
         raise SetupError(f"the run ended well but did not leave {' and '.join(missing)}")
     say(f"the plot is {ROOT / DEMO_PLOT}")
     say(f"the recording is {ROOT / DEMO_RECORDING}")
-    say(f"look at it with: {python.relative_to(ROOT)} -m mjwrap replay {DEMO_RECORDING}")
+    replay = [str(python), "-m", "mjwrap", "replay", DEMO_RECORDING]
+    say(f"look at it with: {python.relative_to(ROOT)} {' '.join(replay[1:])}")
+    if view and has_screen():
+        subprocess.run(replay, cwd=ROOT, env=environment())
     return 0
+
+
+def has_screen() -> bool:
+    """Whether a person sits at a terminal beside a screen."""
+    screen = sys.platform in ("win32", "darwin") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
+    return screen and sys.stdin.isatty() and "CI" not in os.environ
 
 
 def run_tests(mujoco: int, arguments: "list[str]") -> int:
@@ -196,13 +205,14 @@ def run(argv: "list[str] | None") -> int:
         prog="bootstrap.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="{demo,test}")
-    commands.add_parser("demo", help="install, run the elbow, leave a recording and a plot")
+    demo = commands.add_parser("demo", help="install, run the elbow, leave a recording and a plot; play it")
+    demo.add_argument("--no-view", action="store_true", help="open no viewer, also where there is a screen")
     test = commands.add_parser("test", help="install and run the tests; further arguments go to pytest")
     test.add_argument("--mujoco", type=int, choices=sorted(FOLDERS), default=3, help="MuJoCo's major version")
     options, rest = parser.parse_known_args(argv)
     if rest and options.command != "test":
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
-    return run_demo() if options.command == "demo" else run_tests(options.mujoco, rest)
+    return run_demo(not options.no_view) if options.command == "demo" else run_tests(options.mujoco, rest)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import importlib.util
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -126,3 +126,32 @@ def test_a_demo_that_leaves_nothing_is_an_error(
     monkeypatch.setattr(bootstrap.subprocess, "run", Commands())
     assert bootstrap.main(["demo"]) == 1
     assert "did not leave out/elbow.rrd and out/elbow.png" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "screen", "shown"), [([], True, 1), (["--no-view"], True, 0), ([], False, 0)]
+)
+def test_a_demo_is_played_where_there_is_a_screen(
+    bootstrap: ModuleType, monkeypatch: pytest.MonkeyPatch, options: list[str], screen: bool, shown: int
+) -> None:
+    commands = Commands()
+    monkeypatch.setattr(bootstrap.subprocess, "run", commands)
+    monkeypatch.setattr(bootstrap, "has_screen", lambda: screen)
+    (bootstrap.ROOT / "out").mkdir()
+    for name in ("elbow.rrd", "elbow.png"):
+        (bootstrap.ROOT / "out" / name).touch()
+    assert bootstrap.main(["demo", *options]) == 0
+    assert commands.count("replay") == shown
+
+
+def test_there_is_no_screen_without_a_person_at_a_terminal(
+    bootstrap: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.delenv("CI", raising=False)
+    for person in (True, False):
+        monkeypatch.setattr(bootstrap.sys, "stdin", SimpleNamespace(isatty=lambda person=person: person))
+        assert bootstrap.has_screen() is person
+    monkeypatch.setenv("CI", "true")
+    monkeypatch.setattr(bootstrap.sys, "stdin", SimpleNamespace(isatty=lambda: True))
+    assert not bootstrap.has_screen()
