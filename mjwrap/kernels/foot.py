@@ -13,6 +13,10 @@ With W the shape operator at F and h < 0 the height of A, A = F + h n moves by (
 gradient with respect to A is -(I + h W)^-1 t. As a pull e it acts between A's body and the surface's at A itself. It
 grows without bounds towards where F is no longer the only nearest point, an axis or a centre, so no deeper than half
 the way there the way from F stands in.
+
+Nothing stands in on a surface whose wraps have to be searched for: an ellipsoid, a capsule, a torus, a user's own.
+There the way from one foot was found on another side than that from the next, in some of 10,000 small steps, and with
+both ends inside one capsule in many.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, inlined, jit
-from mjwrap.kernels.direct import holds
+from mjwrap.kernels.direct import closed_form, holds
 from mjwrap.kernels.newton import ON_SURFACE
 from mjwrap.kernels.quadric import inverse_squares, onto
 from mjwrap.kernels.relax import keep
@@ -142,7 +146,9 @@ def stand_in(lo, hi, ends, node, tol, direct):
     behind = last_row(a, hi, node) if a >= 0 else lo
     k, j = _contacts(lo, hi, node)
     leaves_a, leaves_b = a >= 0 and not a <= k < behind, b >= 0 and j < b
-    good = not leaves_a or a == lo  # only the surface next to an end can be ignored
+    # a search may find another wrap from one foot than from the next
+    good = (a < 0 or closed_form(node[a, KIND])) and (b < 0 or closed_form(node[b, KIND]))
+    good = good and (not leaves_a or a == lo)  # only the surface next to an end can be ignored
     good = good and (not leaves_b or last_row(b, hi, node) == hi)
     # one that leaves the foot and meets the same surface again, behind a hollow, is none of the ways that are known
     good = good and (a < 0 or leaves_a or node[k, lay.W_L] <= ON_SURFACE * node[k, lay.SIZE])
