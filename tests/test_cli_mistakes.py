@@ -4,8 +4,11 @@ import re
 import resource
 from pathlib import Path
 
+import numpy as np
 import pytest
-from cli_runs import CART, ELBOW, ENTERS, finish, only_files, said, simulate, start
+from cli_runs import CART, ELBOW, ENTERS, finish, only_files, run_here, said, simulate, start
+
+from mjwrap import Table, write_table
 
 
 @pytest.mark.parametrize(
@@ -82,6 +85,51 @@ def test_a_mistake_is_told_in_one_line_and_leaves_nothing(
     assert re.search(told, line), line
     assert ran.out == ""
     only_files(tmp_path, "text.xml", "nan.csv", "sub.csv")
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("run {elbow} --excitation BRA.sto --out BRA.sto", "--out"),
+        ("run {elbow} --excitation BRA.csv --csv sub/../BRA.csv", "--csv"),
+        ("run {elbow} --prescribe q.csv --csv link.csv", "--csv"),
+        ("run {elbow} --excitation p_MuscleAnalysis_Length.sto --analysis p", "--analysis"),
+        ("run m.rrd --record m.rrd", "--record"),
+        ("run m.svg --plot m.svg", "--plot"),
+        ("check m.json --json m.json", "--json"),
+        ("inspect m.json --json=m.json", "--json"),
+        ("replay q.npz --model {elbow} --out q.npz", "--out"),
+        ("replay s.csv --model m.rrd --record m.rrd", "--record"),
+        ("compare {elbow} --excitation BRA.csv --csv BRA.csv", "--csv"),
+        ("compare {elbow} --states q.csv --lengths BRA.csv --csv BRA.csv", "--csv"),
+        ("compare {elbow} --states q.npz --moment-arms elbow_flexion=BRA.csv --csv BRA.csv", "--csv"),
+        ("compare m.html --report m.html", "--report"),
+    ],
+)
+def test_no_output_takes_the_place_of_an_input(
+    command: str,
+    option: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    columns = {
+        "BRA.sto": "BRA", "BRA.csv": "BRA", "q.csv": "elbow_flexion", "q.npz": "elbow_flexion", "s.csv": "slide",
+    }  # fmt: skip
+    for file, column in columns.items():
+        write_table(file, Table(np.array([0.0, 1.0]), (column,), np.array([[0.2], [0.3]])))
+    Path("p_MuscleAnalysis_Length.sto").write_bytes(Path("BRA.sto").read_bytes())
+    Path("sub").mkdir()
+    Path("link.csv").symlink_to("q.csv")
+    for suffix in ("rrd", "svg", "json", "html"):
+        Path(f"m.{suffix}").write_text(ENTERS)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    name, *arguments = command.format(elbow=ELBOW).split()
+    ran = run_here(name, capsys, *arguments)
+    assert ran.code == 2
+    assert re.fullmatch(f"mjwrap {name}: {option} '.*': that file is also read", said(ran)[-1])
+    assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
 def test_a_motion_that_blows_up_is_told_and_leaves_nothing(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import mjwrap
 from mjwrap.cli import console
 from mjwrap.cli.errors import RUN_FAILED, USER_ERROR, RunError
-from mjwrap.cli.output import say, written
+from mjwrap.cli.output import note_inputs, say, written
 
 COMMANDS = {
     "run": "simulate a model with its muscles along geodesic paths",
@@ -86,4 +86,5 @@ def _execute(name: str, arguments: list[str]) -> int:
     command.add_arguments(parser)
     options = parser.parse_args(arguments)
     options.given = list(arguments)  # as typed, for what says how it was made
+    note_inputs(options)
     return command.execute(options)

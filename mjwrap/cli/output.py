@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
@@ -16,11 +17,38 @@ from mjwrap.errors import RecordingError
 from mjwrap.output import PartFile, uninterrupted
 
 Kept = TypeVar("Kept")
+READ = (
+    "model",
+    "file",
+    "excitation",
+    "prescribe",
+    "states",
+    "lengths",
+    "moment_arms",
+)  # options that name inputs
 _files: list[PartFile] = []  # of the command that runs
+_inputs: set[str] = set()  # resolved paths of the files that it reads
+
+
+def note_inputs(options: argparse.Namespace) -> None:
+    """Remember the files that a command's options name to be read, which no output may take the place of."""
+    for option in READ:
+        given = getattr(options, option, None) or []
+        for entry in [given] if isinstance(given, str) else given:
+            for path in (entry, entry.partition("=")[2]):  # JOINT=FILE
+                if os.path.isfile(path):
+                    _inputs.add(os.path.realpath(path))
+
+
+def check_unread(path: str, option: str) -> None:
+    """Raise `UserError` where an output would take the place of a file that the command reads."""
+    if os.path.realpath(path) in _inputs:
+        raise UserError(f"{option} '{path}': that file is also read")
 
 
 def open_output(path: str, option: str, *suffixes: str) -> PartFile:
     """Return a file to be written; what is wrong with its place is the user's to mend, before the run."""
+    check_unread(path, option)
     with uninterrupted():
         file = opened(lambda: PartFile(path, *suffixes, option=option))
         _files.append(file)
@@ -38,10 +66,11 @@ def opened(make: Callable[[], Kept]) -> Kept:
 
 
 def discard_outputs() -> None:
-    """Remove what has not become a file."""
+    """Remove what has not become a file, at the end of a command."""
     for file in _files:
         file.discard()
     _files.clear()
+    _inputs.clear()
 
 
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:

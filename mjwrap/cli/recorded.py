@@ -9,7 +9,7 @@ from typing import Any
 
 from mjwrap.cli.arguments import port, positive
 from mjwrap.cli.errors import UserError
-from mjwrap.cli.output import opened
+from mjwrap.cli.output import check_unread, opened
 from mjwrap.cli.stopping import Stopped
 from mjwrap.recording import Recorder, Server
 
@@ -76,6 +76,8 @@ def open_recorder(
 ) -> Recorder:
     """Return the recorder that the options ask for, to be closed by `stack`; connect: an address, LOCAL or empty."""
     groups = read_groups(options.groups)
+    if path is not None:
+        check_unread(path, "--record")
     recorder = opened(
         lambda: Recorder(
             model,
