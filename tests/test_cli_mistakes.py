@@ -132,6 +132,20 @@ def test_no_output_takes_the_place_of_an_input(
     assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
 
 
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [("check", "no check failed"), ("compare", "no motion: the model has no joint")],
+)
+def test_a_model_without_joints_has_nothing_to_sweep(
+    command: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "m.xml"
+    model.write_text(re.sub("<joint[^>]*/>", "", ENTERS))
+    ran = run_here(command, capsys, model)
+    assert (ran.code, said(ran)) == (0, [])
+    assert told in ran.out
+
+
 def test_a_motion_that_blows_up_is_told_and_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -135,7 +135,9 @@ def execute(options: argparse.Namespace) -> int:
 
     tell_tables(report.say, tables)
     motion = None
-    if options.duration > 0.0:
+    if options.duration > 0.0 and not model.nv:
+        report.say("\nno motion: the model has no joint")
+    elif options.duration > 0.0:
         moved, changed = with_native_laws(model) if options.law == "mujoco" else (model, [])
         motion = compare_motion(moved, options.excitation, options.duration, key=key, seed=options.seed)
         tell_motion(report.say, motion, changed, options.excitation)

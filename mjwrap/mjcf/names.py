@@ -41,7 +41,7 @@ def dof_names(model: mujoco.MjModel) -> list[str]:
 
 
 def _joint_names(model: mujoco.MjModel, starts: list[int], total: int) -> list[str]:
-    ends = [*starts[1:], total]
+    ends = [*starts, total][1:]
     joints = (name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in range(model.njnt))
     pairs = zip(joints, starts, ends, strict=True)
     return [each for name, first, last in pairs for each in _numbered(name, last - first)]
