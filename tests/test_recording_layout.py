@@ -1,5 +1,6 @@
 """What the viewer opens with, and which muscles stand together in it."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,7 @@ import mjwrap as mw
 
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 
+from cli_runs import ENTERS
 from made_up_runs import MEASURED, ROOT, XML, Muscles, read, recorder, states
 from rerun.chunk import RrdReader
 
@@ -171,3 +173,15 @@ def test_the_eye_follows_a_body_that_carries_all_muscles_and_moves_freely(tmp_pa
         followed = layout(tmp_path / "run.rrd", "EyeControls3D:tracking_entity")
         origins = {model.body(model.site_bodyid[m.origin_site]).name for m in muscles.declarations}
         assert bool(followed) == (free and "world" not in origins)
+
+
+def test_a_model_of_the_world_alone_is_looked_at(tmp_path: Path) -> None:
+    """No body says from which side."""
+    model = mujoco.MjModel.from_xml_string(re.sub("</?body>|<joint[^>]*/>", "", ENTERS))
+    assert model.nbody == 1
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    muscles.forward(data)
+    with mw.Recorder(model, muscles, tmp_path / "run.rrd") as run:
+        run.log(data)
+    (eye,) = layout(tmp_path / "run.rrd", "EyeControls3D:position")
+    assert np.isfinite(eye).all()

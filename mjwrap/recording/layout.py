@@ -222,7 +222,7 @@ def _eye(scene: Scene, first: First) -> rrb.EyeControls3D | None:
     if len(axes) < 3 or np.linalg.norm(level) < 0.3:  # no thinnest direction, or the vertical: from the front
         level = np.array([0.0, 1.0, 0.0])
     level /= np.linalg.norm(level)
-    if (bodies.mean(axis=0) - target) @ level > 0:
+    if len(bodies) and (bodies.mean(axis=0) - target) @ level > 0:
         level = -level
     eye = target + 1.1 * size * (level + np.array([0.0, 0.0, 0.35]))
     return rrb.EyeControls3D(
