@@ -66,11 +66,21 @@ def test_a_folder_without_permission_is_an_error_before_the_run(
 
 
 @pytest.mark.parametrize(
-    "option", [{"path_rate": 0}, {"path_rate": np.nan}, {"flush_every": 0}, {"spacing": -1}]
-)
-def test_a_bad_option_is_an_error(model: mujoco.MjModel, tmp_path: Path, option: dict[str, float]) -> None:
+    "option",
+    [
+        {"path_rate": 0}, {"path_rate": np.nan}, {"rate": "60"}, {"rate": np.inf}, {"flush_every": 0},
+        {"flush_every": 2.5}, {"flush_every": 1e3}, {"spacing": -1}, {"force_scale": "big"},
+    ],
+)  # fmt: skip
+def test_a_bad_option_is_an_error(model: mujoco.MjModel, tmp_path: Path, option: dict[str, Any]) -> None:
     with pytest.raises(mw.RecordingError, match=f"{next(iter(option))} must be"):
         recorder(model, Muscles(model), tmp_path / "run.rrd", **option)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_room_that_is_not_there_leaves_nothing(model: mujoco.MjModel, tmp_path: Path) -> None:
+    with pytest.raises(MemoryError):
+        recorder(model, Muscles(model), tmp_path / "run.rrd", flush_every=2**50)
     assert list(tmp_path.iterdir()) == []
 
 

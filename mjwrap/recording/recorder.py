@@ -1,6 +1,7 @@
 """`Recorder`: what happened in a run, as a file that the rerun viewer replays."""
 
 import math
+import numbers
 import os
 import time
 from collections.abc import Iterable, Mapping
@@ -12,7 +13,7 @@ from mjwrap.errors import RecordingError
 from mjwrap.output import PartFile, RunLog, require
 
 if TYPE_CHECKING:
-    from mjwrap.recording.scene import Scene
+    from mjwrap.recording.frames import Buffers
     from mjwrap.recording.stream import Stream
     from mjwrap.system.results import Results
 
@@ -58,26 +59,25 @@ class Recorder(RunLog):
         flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
-        require("rate", rate, rate is None or 0 < rate < math.inf, "a positive number of states per second")
-        require("path_rate", path_rate, 0 < path_rate < math.inf, "a positive number of frames per second")
-        scaled = force_scale is None or 0 < force_scale < math.inf
+        require("rate", rate, rate is None or _positive(rate), "a positive number of states per second")
+        require("path_rate", path_rate, _positive(path_rate), "a positive number of frames per second")
+        scaled = force_scale is None or _positive(force_scale)
         require("force_scale", force_scale, scaled, "a positive length per force in metres per newton")
-        require("flush_every", flush_every, flush_every is None or flush_every >= 1, "at least 1")
-        require("spacing", spacing, spacing is None or 0 < spacing < math.inf, "a positive length in metres")
+        whole = flush_every is None or (isinstance(flush_every, numbers.Integral) and flush_every >= 1)
+        require("flush_every", flush_every, whole, "a whole number, at least 1")
+        require("spacing", spacing, spacing is None or _positive(spacing), "a positive length in metres")
         if path is None and not connect:
             raise RecordingError("there is nowhere to record to: give a file name, or connect=True, or both")
         target = None if path is None else PartFile(path, SUFFIX)
         self._live, self._batch_due = bool(connect), -math.inf
         try:
-            scene, self._stream = _open(model, muscles, target, connect, groups)
+            rows = flush_every or int(np.clip(BUFFERED // max(1, muscles.n), 250, 4000))
+            how = rate, path_rate, spacing, force_scale
+            self._buffers, self._stream = _open(model, muscles, target, connect, groups, rows, how)
         except BaseException:
             if target:
                 target.discard()
             raise
-        from mjwrap.recording.frames import Buffers, Options
-
-        rows = flush_every or int(np.clip(BUFFERED // max(1, muscles.n), 250, 4000))
-        self._buffers = Buffers(scene, muscles, rows, Options(rate, path_rate, spacing, force_scale))
         self._laid_out = False
         self._begin(str(connect if target is None else target.path), target, self._stream.abandon)
 
@@ -120,14 +120,21 @@ def _open(
     target: PartFile | None,
     connect: bool | str,
     groups: Mapping[str, str | Iterable[str]] | None,
-) -> tuple["Scene", "Stream"]:
-    """Start the file or the connection; rerun loads here and nowhere earlier."""
+    rows: int,
+    how: tuple[float | None, float, float | None, float | None],
+) -> tuple["Buffers", "Stream"]:
+    """Make room for so many rows and start the file or the connection; rerun loads here and nowhere earlier.
+
+    how: the fields of `frames.Options`.
+    """
     try:
+        from mjwrap.recording.frames import Buffers, Options
         from mjwrap.recording.scene import Scene, model_name
         from mjwrap.recording.stream import VIEWER, Stream
     except ImportError as error:
         raise RecordingError(f"cannot record: {error}; install rerun with: pip install rerun-sdk") from error
     scene = Scene(model, muscles, groups)
+    buffers = Buffers(scene, muscles, rows, Options(*how))
     name = model_name(model)
     stream = Stream(target, VIEWER if connect is True else connect or None, name)
     try:
@@ -137,4 +144,9 @@ def _open(
     except BaseException:
         stream.abandon()
         raise
-    return scene, stream
+    return buffers, stream
+
+
+def _positive(value: object) -> bool:
+    """Whether an option is a finite number above zero."""
+    return isinstance(value, numbers.Real) and 0 < float(value) < math.inf
