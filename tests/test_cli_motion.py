@@ -104,11 +104,11 @@ def test_excitations_come_from_opensims_files(tmp_path: Path, capsys: pytest.Cap
     mw.write_table(tmp_path / "u.csv", mw.Table(times, ("BRA", "TRIlat"), level))
     mw.write_table(tmp_path / "u.sto", mw.Table(times, ("/forceset/BRA", "TRIlat.excitation"), level))
     ends = []
-    for given in ("u.csv", "u.sto", "c.csv"):
-        options = ["--duration", 0.1, "--sample", 0.002, "--csv", tmp_path / "c.csv"]
+    for given, left in (("u.csv", "c.csv"), ("u.sto", "c.csv"), ("c.csv", "d.csv")):
+        options = ["--duration", 0.1, "--sample", 0.002, "--csv", tmp_path / left]
         ran = simulate(capsys, ELBOW, "--excitation", tmp_path / given, *options)
         assert ran.code == 0, ran.err
-        ends.append(rows_of(tmp_path / "c.csv")[-1])
+        ends.append(rows_of(tmp_path / left)[-1])
     assert ends[0] == ends[1]
     assert ends[0] == pytest.approx(ends[2], rel=1e-12)
     mw.write_table(tmp_path / "u.sto", mw.Table(times, ("/forceset/BRA", "BRA"), level))
