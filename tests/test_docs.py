@@ -16,15 +16,10 @@ from typing import NamedTuple
 
 import mujoco
 import pytest
+from doc_commands import FENCE, PAGES, ROOT
 
 import mjwrap as mw
 
-ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-
-_FENCE = re.compile(
-    r"^(?P<mark>```+)(?P<language>\w*)[^\n]*\n(?P<body>.*?)^(?P=mark)[ \t]*$", re.DOTALL | re.MULTILINE
-)
 _NO_TEST = re.compile(r"<!-- no-test: *(?P<reason>[^\n]*?) *-->\s*\Z")
 
 
@@ -40,7 +35,7 @@ def snippets(text: str) -> list[Snippet]:
     """Return the python fences of a page that are to be run."""
     found: list[Snippet] = []
     last_end = -1
-    for fence in _FENCE.finditer(text):
+    for fence in FENCE.finditer(text):
         before, between = text[: fence.start()], text[last_end : fence.start()] if last_end >= 0 else "-"
         last_end = -1
         if fence["language"] == "text" and found and not between.strip():
@@ -127,7 +122,7 @@ def test_code_that_is_not_run_names_what_exists() -> None:
 
 
 def test_every_fence_is_of_a_language_that_is_tested() -> None:
-    marks = {(page.name, fence["language"]) for page in PAGES for fence in _FENCE.finditer(page.read_text())}
+    marks = {(page.name, fence["language"]) for page in PAGES for fence in FENCE.finditer(page.read_text())}
     assert {mark for mark in marks if mark[1] not in ("python", "text", "sh", "xml")} == set()
 
 
@@ -142,7 +137,7 @@ def test_xml_fences_compile_in_their_models() -> None:
     found = {
         page.name: fence["body"]
         for page in PAGES
-        for fence in _FENCE.finditer(page.read_text())
+        for fence in FENCE.finditer(page.read_text())
         if fence["language"] == "xml"
     }
     assert set(found) == {"declaring.md", "muscles.md"}, "say here what another page's XML is a part of"

@@ -188,17 +188,3 @@ def list_strips(starts, routes, sizes, counts):
                     strips += 1
             counts[m, t] = strips - before
     return strips
-
-
-@jit
-def muscle_starts(starts, routes, by_muscle):
-    """Write where each muscle's rows begin within frames to by_muscle (T, n + 1), from where each route's do."""
-    for t in range(by_muscle.shape[0]):
-        m = 0
-        for c in range(routes.shape[0]):
-            while m <= routes[c, R_MUSCLE]:
-                by_muscle[t, m] = starts[t, c]
-                m += 1
-        while m < by_muscle.shape[1]:
-            by_muscle[t, m] = starts[t, -1]
-            m += 1

@@ -135,11 +135,11 @@ class History:
         """
         store, routes = self._points, self._plan[0]
         out, counts = self._room(room, "points", store, frames)
-        sizes, starts = (
-            np.empty(len(routes) * frames, dtype=np.int64),
-            np.empty((frames, len(counts) + 1), np.int64),
-        )
-        footage.muscle_starts(store.starts, routes, starts)
+        sizes = np.empty(len(routes) * frames, dtype=np.int64)
+        first = np.searchsorted(
+            routes[:, coupling.R_MUSCLE], np.arange(len(counts) + 1)
+        )  # route of each muscle
+        starts = store.starts[:frames].take(first, axis=1)
         footage.gather(store.rows, starts, self._where, out, counts)
         count = footage.list_strips(store.starts, routes, sizes, counts)
         return out, sizes[:count], counts
