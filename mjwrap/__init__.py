@@ -18,7 +18,6 @@ from mjwrap.errors import (
 )
 
 if TYPE_CHECKING:
-    from mjwrap.activation import ActivationDynamics
     from mjwrap.calibration import (
         FiberFit,
         Finding,
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
         implausible,
         length_ranges,
     )
-    from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
-    from mjwrap.energetics import Energetics, Umberger2010, basal_power
     from mjwrap.files import Table, read_table, write_table
     from mjwrap.fitting import (
         Fit,
@@ -47,7 +44,10 @@ if TYPE_CHECKING:
         mesh_points,
     )
     from mjwrap.mjcf import set_laws
-    from mjwrap.muscles import DeGrooteFregly2016, Millard2012, MuJoCoMuscle, PathActuator
+    from mjwrap.muscles.activation import ActivationDynamics
+    from mjwrap.muscles.bench import MuscleTrial, simulate_muscle
+    from mjwrap.muscles.energetics import Energetics, Umberger2010, basal_power
+    from mjwrap.muscles.laws import DeGrooteFregly2016, Millard2012, MuJoCoMuscle, PathActuator
     from mjwrap.paths import (
         Contact,
         Obstacle,
@@ -60,9 +60,17 @@ if TYPE_CHECKING:
     )
     from mjwrap.plugin import install, load
     from mjwrap.recording import Recorder
-    from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Torus
+    from mjwrap.surfaces import (
+        Capsule,
+        Cone,
+        Cylinder,
+        Ellipsoid,
+        EllipticCylinder,
+        Sphere,
+        Torus,
+    )
+    from mjwrap.surfaces.user import ImplicitSurface, ParametricSurface
     from mjwrap.system import MuscleSystem
-    from mjwrap.trials import MuscleTrial, simulate_muscle
     from mjwrap.video import Video
 
 __version__ = "0.1.0"
@@ -79,8 +87,8 @@ _HOMES = {
     "hill_from_mujoco": "calibration",
     "implausible": "calibration",
     "length_ranges": "calibration",
-    "ImplicitSurface": "custom_surfaces",
-    "ParametricSurface": "custom_surfaces",
+    "ImplicitSurface": "surfaces.user",
+    "ParametricSurface": "surfaces.user",
     "Capsule": "surfaces",
     "Cone": "surfaces",
     "Cylinder": "surfaces",
@@ -111,14 +119,14 @@ _HOMES = {
     "DeGrooteFregly2016": "muscles",
     "Millard2012": "muscles",
     "set_laws": "mjcf",
-    "ActivationDynamics": "activation",
-    "simulate_muscle": "trials",
-    "MuscleTrial": "trials",
+    "ActivationDynamics": "muscles",
+    "simulate_muscle": "muscles.bench",
+    "MuscleTrial": "muscles.bench",
     "MuJoCoMuscle": "muscles",
     "PathActuator": "muscles",
-    "Energetics": "energetics",
-    "Umberger2010": "energetics",
-    "basal_power": "energetics",
+    "Energetics": "muscles.energetics",
+    "Umberger2010": "muscles.energetics",
+    "basal_power": "muscles.energetics",
     "MuscleSystem": "system",
     "Recorder": "recording",
     "install": "plugin",

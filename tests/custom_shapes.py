@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.custom_surfaces import CustomSurface, ImplicitSurface, ParametricSurface
-from mjwrap.kernels import custom
 from mjwrap.kernels import layout as lay
+from mjwrap.kernels.geometry import user_surface
+from mjwrap.surfaces.user import CustomSurface, ImplicitSurface, ParametricSurface
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ def random_rows(surface: CustomSurface, count: int, rng: np.random.Generator) ->
     node = place(surface, np.zeros((count, lay.ROW)))
     node[:, lay.ROT : lay.ROT + 9] = np.eye(3).ravel()
     for k in range(count):
-        point = custom.custom_project(k, node, *rng.normal(size=3) * 0.03)
+        point = user_surface.custom_project(k, node, *rng.normal(size=3) * 0.03)
         tangent = np.cross(point[3:], rng.normal(size=3))
         node[k, lay.S_P : lay.S_P + 3] = point[:3]
         node[k, lay.S_T : lay.S_T + 3] = tangent / np.linalg.norm(tangent)
@@ -139,5 +139,5 @@ def random_rows(surface: CustomSurface, count: int, rng: np.random.Generator) ->
 def followed(node: Array) -> Array:
     """Return the rows with their geodesics evaluated."""
     for k in range(len(node)):
-        custom.custom_geodesic(k, node)
+        user_surface.custom_geodesic(k, node)
     return node

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scenes import rotation
 
 import mjwrap as mw
+from mjwrap.verification.scenes import rotation
 
 Array = NDArray[np.float64]
 SPACING = 0.12  # from obstacle to obstacle [m]

@@ -1,12 +1,11 @@
 """The command lines that a reader meets: in the pages' shell fences and inline, and in the help texts."""
 
-import importlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from mjwrap.cli.main import COMMANDS, HELP
+from mjwrap.cli.main import COMMANDS, HELP, module_of
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -42,7 +41,7 @@ def of_help() -> Iterator[Line]:
 
 
 def _documentation(name: str) -> str:
-    return importlib.import_module(f"mjwrap.cli.{name}").__doc__ or ""
+    return module_of(name).__doc__ or ""
 
 
 def _split(text: str, where: str, typed: bool) -> Iterator[Line]:

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 import mjwrap as mw
-from mjwrap.energetics import Energetics, compute_energetics, metabolic_constants
-from mjwrap.kernels import muscle as muscle_kernel
+from mjwrap.kernels.musculotendon import tension as muscle_kernel
+from mjwrap.muscles.energetics import Energetics, compute_energetics, metabolic_constants
 
 Vector = NDArray[np.float64]
 EACH_LAW = pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])

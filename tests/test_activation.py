@@ -12,8 +12,13 @@ from mjcf_reading import Vector
 from scipy.integrate import solve_ivp
 
 import mjwrap as mw
-from mjwrap.kernels import activation
-from mjwrap.kernels.activation import advance_activation, advance_smooth, smooth_rate, zajac_rate
+from mjwrap.kernels.musculotendon import activation_dynamics
+from mjwrap.kernels.musculotendon.activation_dynamics import (
+    advance_activation,
+    advance_smooth,
+    smooth_rate,
+    zajac_rate,
+)
 
 EXACT = 1e-13  # rounding over one exact step; the reference is integrated to 1e-13
 TIMES = (0.01, 0.04)  # [s]
@@ -118,15 +123,15 @@ def test_the_smooth_form_stays_between_activation_and_excitation() -> None:
 
 def test_forms_by_their_codes() -> None:
     for form, rate, step in (
-        (activation.ZAJAC, zajac_rate(0.7, 0.2, *TIMES), advance_activation(0.2, 0.7, *TIMES, 2e-3)),
+        (activation_dynamics.ZAJAC, zajac_rate(0.7, 0.2, *TIMES), advance_activation(0.2, 0.7, *TIMES, 2e-3)),
         (
-            activation.SMOOTH,
+            activation_dynamics.SMOOTH,
             smooth_rate(0.7, 0.2, *TIMES, 10.0),
             advance_smooth(0.2, 0.7, *TIMES, 10.0, 2e-3),
         ),
     ):
-        assert activation.rate(form, 0.7, 0.2, *TIMES, 10.0) == rate
-        assert activation.advance(form, 0.2, 0.7, *TIMES, 10.0, 2e-3) == step
+        assert activation_dynamics.rate(form, 0.7, 0.2, *TIMES, 10.0) == rate
+        assert activation_dynamics.advance(form, 0.2, 0.7, *TIMES, 10.0, 2e-3) == step
 
 
 def test_two_half_steps_make_a_whole_one() -> None:
@@ -248,15 +253,15 @@ SOURCES = {
 
 @pytest.mark.parametrize("case", SOURCES)
 def test_a_path_actuator_takes_the_control_of_a_stateless_actuator(case: str) -> None:
-    actuator, control, activation = SOURCES[case]
+    actuator, control, activation_dynamics = SOURCES[case]
     custom = declared([element("actuator", "x"), element("tendon", "extensor")], ROPE)
     muscles = mw.MuscleSystem(compiled(actuator=MUSCLE + actuator, custom=custom))
     data = mujoco.MjData(muscles.model)
     data.ctrl[:] = 0.0, control
     muscles.forward(data)
     x = muscles.index("x")
-    assert muscles.activation[x] == activation
-    assert muscles.tension[x] == pytest.approx(max(activation, 0.0) * 80.0, rel=1e-15)
+    assert muscles.activation[x] == activation_dynamics
+    assert muscles.tension[x] == pytest.approx(max(activation_dynamics, 0.0) * 80.0, rel=1e-15)
     muscles.step(data)
     assert data.actuator("x").force[0] == 0.0
 

@@ -22,27 +22,35 @@ ENVIRONMENT["PYTHONPATH"] = str(BENCHMARKS.parent)
 @pytest.mark.parametrize(
     ("script", "arguments", "message"),
     [
-        ("bench_paths.py", ["--poses", "3"], "--poses at least 105"),
-        ("bench_paths.py", ["--scenes", "1 cylinder", "1 cube"], "'1 cube'; there are: 1 cylinder, 1 sphere"),
-        ("bench_paths.py", ["--against", "no/such.json"], "cannot read no/such.json: No such file"),
-        ("bench_paths.py", ["--against", str(BENCHMARKS / "energy.py")], "is not a file that --json of this"),
-        ("bench_paths.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("bench_step.py", ["--repeats", "0"], "--repeats must be at least 1"),
-        ("bench_step.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("bench_models.py", ["--runs", "0"], "--runs must be at least 1"),
-        ("bench_models.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("bench_models.py", ["--models", "spider"], "invalid choice: 'spider'"),
-        ("bench_rollout.py", ["--steps", "0"], "--steps must be at least 1"),
-        ("bench_rollout.py", ["--threads", "1", "0"], "--threads must be at least 1"),
-        ("bench_rollout.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("bench_muscle.py", ["--repeats", "0"], "--repeats must be at least 1"),
-        ("bench_muscle.py", ["--step", "nan"], "--step must be above 0"),
-        ("bench_muscle.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("energy.py", ["--seconds", "nan"], "--seconds must be between"),
-        ("plugin_soak.py", ["--loads", "5"], "show nothing"),
-        ("plugin_hostile.py", ["--scenes", "none"], "invalid choice: 'none'"),
-        ("upgrade_models.py", ["--samples", "2"], "0, or 3 at least"),
-        ("upgrade_models.py", ["no/such.xml"], "no/such.xml"),
+        ("speed/bench_paths.py", ["--poses", "3"], "--poses at least 105"),
+        (
+            "speed/bench_paths.py",
+            ["--scenes", "1 cylinder", "1 cube"],
+            "'1 cube'; there are: 1 cylinder, 1 sphere",
+        ),
+        ("speed/bench_paths.py", ["--against", "no/such.json"], "cannot read no/such.json: No such file"),
+        (
+            "speed/bench_paths.py",
+            ["--against", str(BENCHMARKS / "robustness" / "energy.py")],
+            "is not a file that --json of this",
+        ),
+        ("speed/bench_paths.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("speed/bench_step.py", ["--repeats", "0"], "--repeats must be at least 1"),
+        ("speed/bench_step.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("speed/bench_models.py", ["--runs", "0"], "--runs must be at least 1"),
+        ("speed/bench_models.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("speed/bench_models.py", ["--models", "spider"], "invalid choice: 'spider'"),
+        ("speed/bench_rollout.py", ["--steps", "0"], "--steps must be at least 1"),
+        ("speed/bench_rollout.py", ["--threads", "1", "0"], "--threads must be at least 1"),
+        ("speed/bench_rollout.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("speed/bench_muscle.py", ["--repeats", "0"], "--repeats must be at least 1"),
+        ("speed/bench_muscle.py", ["--step", "nan"], "--step must be above 0"),
+        ("speed/bench_muscle.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("robustness/energy.py", ["--seconds", "nan"], "--seconds must be between"),
+        ("plugin/plugin_soak.py", ["--loads", "5"], "show nothing"),
+        ("plugin/plugin_hostile.py", ["--scenes", "none"], "invalid choice: 'none'"),
+        ("plugin/upgrade_models.py", ["--samples", "2"], "0, or 3 at least"),
+        ("plugin/upgrade_models.py", ["no/such.xml"], "no/such.xml"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_runs(
@@ -65,7 +73,7 @@ def test_bad_arguments_are_refused_before_anything_runs(
 def test_the_step_benchmark_runs_and_adds_up(tmp_path: Path) -> None:
     file = tmp_path / "step.json"
     done = subprocess.run(
-        [sys.executable, str(BENCHMARKS / "bench_step.py"), "--repeats", "1", "--json", str(file)],
+        [sys.executable, str(BENCHMARKS / "speed" / "bench_step.py"), "--repeats", "1", "--json", str(file)],
         cwd=BENCHMARKS.parent,
         env=ENVIRONMENT,
         capture_output=True,
@@ -86,7 +94,7 @@ def test_the_benchmarks_of_installed_models_pair_what_they_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The elbow, with and without the plugin: all variants start every block from the same state."""
-    monkeypatch.syspath_prepend(BENCHMARKS)
+    monkeypatch.syspath_prepend(BENCHMARKS / "speed")
     bench, throughput = importlib.import_module("bench_models"), importlib.import_module("bench_rollout")
     file, label = tmp_path / "rows.json", bench.HOME
     modes = ["wrench", bench.SYSTEM]
@@ -121,7 +129,7 @@ def test_the_muscle_benchmark_counts_what_it_times(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its short run of every row, which may miss a target on a busy machine, but not fail."""
-    monkeypatch.syspath_prepend(BENCHMARKS)
+    monkeypatch.syspath_prepend(BENCHMARKS / "speed")
     bench = importlib.import_module("bench_muscle")
     file = tmp_path / "muscle.json"
     monkeypatch.setattr(bench, "STEPS", 100)
@@ -144,7 +152,7 @@ def test_the_muscle_benchmark_counts_what_it_times(
 
 
 def test_a_step_that_does_not_balance_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(BENCHMARKS)
+    monkeypatch.syspath_prepend(BENCHMARKS / "speed")
     bench = importlib.import_module("bench_muscle")
     monkeypatch.setattr(bench, "STEPS", 4)
     motion = bench.prepare("millard_2012", "elastic", 2e-3)
@@ -189,7 +197,7 @@ def test_the_table_of_models_tells_mujocos_jump_and_mjwraps_smooth_path(tmp_path
     model.write_text(JUMPING)
     arguments = [str(model), "--seconds", "0.2", "--samples", "21", "--bases", "0", "--json", str(file)]
     done = subprocess.run(
-        [sys.executable, str(BENCHMARKS / "upgrade_models.py"), *arguments],
+        [sys.executable, str(BENCHMARKS / "plugin" / "upgrade_models.py"), *arguments],
         cwd=tmp_path,
         env=ENVIRONMENT,
         capture_output=True,

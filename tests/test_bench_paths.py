@@ -11,7 +11,7 @@ import numba
 import numpy as np
 import pytest
 from numba.core import config as numba_config
-from scenes import reference_scene
+from reference_paths import reference_scene
 
 import mjwrap as mw
 
@@ -24,7 +24,7 @@ compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="about compiled k
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.syspath_prepend(BENCHMARKS)
+    monkeypatch.syspath_prepend(BENCHMARKS / "speed")
     return importlib.import_module("bench_paths")
 
 

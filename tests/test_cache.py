@@ -52,7 +52,8 @@ print(json.dumps({"numbers": sweep.length.tolist(), "folder": _jit._CACHE}))
 # A kernel that compiles in seconds, and that calls one in another file.
 PULL = """
 import json, numpy as np
-from mjwrap.kernels import _jit, fiber
+from mjwrap.kernels import _jit
+from mjwrap.kernels.musculotendon import fiber
 print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": _jit._CACHE}))
 """
 
@@ -161,7 +162,7 @@ def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
     before = run(PULL, home, package)
     assert before.told[0].startswith(NOTICE)
     assert run(PULL, home, package).told == []
-    callee = package / "kernels" / "degroote_fregly.py"
+    callee = package / "kernels" / "musculotendon" / "degroote_fregly.py"
     text = callee.read_text()
     assert text.count("0.8825327733249912") == 1
     callee.write_text(text.replace("0.8825327733249912", "0.9825327733249912"))

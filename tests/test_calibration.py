@@ -12,7 +12,7 @@ from scipy.optimize import differential_evolution
 
 import mjwrap as mw
 from mjwrap.calibration.joints import JointSpace
-from mjwrap.poses import PoseMaker
+from mjwrap.poses.joint_sweeps import PoseMaker
 
 SIDES = 4
 REACH = 1.2  # [rad] of the shoulder

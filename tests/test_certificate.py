@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arcs import arcs_of, slow_arc
-from certificate import Case, findings, grouped, laid_out, stiffness
-from scenes import random_surface
-from shaking import lowest, shaken_stiffness
-from shapes import SHAPES, Array, Shape, dot, sizes, unit
 
 import mjwrap as mw
+from mjwrap.verification.arcs import arcs_of, slow_arc
+from mjwrap.verification.certificate import Case, findings, grouped, laid_out, stiffness
+from mjwrap.verification.scenes import random_surface
+from mjwrap.verification.shaking import lowest, shaken_stiffness
+from mjwrap.verification.shapes import SHAPES, Array, Shape, dot, sizes, unit
 
 LETTERS = "cselktp"
 NAMES = {

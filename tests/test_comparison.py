@@ -20,8 +20,8 @@ from mjwrap.comparison import (
 )
 from mjwrap.comparison.tendons import WrapRecord, tendon_spans
 from mjwrap.comparison.twins import Comparer
-from mjwrap.continuity import refine_jump
-from mjwrap.poses import PoseMaker
+from mjwrap.poses.continuity import refine_jump
+from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.system import MuscleSystem
 
 BALL = """

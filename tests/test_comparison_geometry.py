@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scenes import rotation
 
-from mjwrap.comparison.geometry import Fault, Judgement, closed_form_length, judge, judge_held
+from mjwrap.comparison.judge_geodesic import Fault, Judgement, closed_form_length, judge, judge_held
+from mjwrap.verification.scenes import rotation
 
 Array = np.ndarray
 

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from mjwrap.cli.compare_files import millimetres
+from mjwrap.cli.compare.text import millimetres
 from mjwrap.comparison import Jump, MuscleSummary, verdict
 
 

@@ -17,8 +17,8 @@ from custom_shapes import (
 )
 
 import mjwrap as mw
-from mjwrap.custom_surfaces import ImplicitSurface
 from mjwrap.kernels import _jit
+from mjwrap.surfaces.user import ImplicitSurface
 
 ROOT = Path(mw.__file__).parent.parent
 
@@ -27,8 +27,9 @@ import json, sys, time
 sys.path.insert(0, {tests!r})
 from custom_shapes import torus, bean
 import mjwrap, math
-from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
-from mjwrap.kernels import custom, _jit
+from mjwrap.surfaces.user import ImplicitSurface, ParametricSurface
+from mjwrap.kernels import _jit
+from mjwrap.kernels.geometry import user_surface as custom
 started = time.perf_counter()
 shapes = [ParametricSurface(torus, (0.0, math.tau), (0.0, math.tau)), ImplicitSurface(bean, (0.06, 0.06, 0.04))]
 seconds = time.perf_counter() - started

@@ -19,8 +19,8 @@ from custom_shapes import (
 )
 
 import mjwrap as mw
-from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
 from mjwrap.errors import GeometryError
+from mjwrap.surfaces.user import ImplicitSurface, ParametricSurface
 
 ROOT = Path(mw.__file__).parent.parent
 TURN = (0.0, math.tau)

@@ -20,11 +20,11 @@ from custom_shapes import (
     torus,
 )
 
-from mjwrap.custom.source import Source, from_text
-from mjwrap.custom.symbols import derive
-from mjwrap.custom_surfaces import ImplicitSurface, ParametricSurface
-from mjwrap.kernels import custom
 from mjwrap.kernels import layout as lay
+from mjwrap.kernels.geometry import user_surface
+from mjwrap.surfaces.codegen.source import Source, from_text
+from mjwrap.surfaces.codegen.symbols import derive
+from mjwrap.surfaces.user import ImplicitSurface, ParametricSurface
 
 TURN = (0.0, math.tau)
 LIMIT = -0.03
@@ -199,7 +199,7 @@ def test_outside_is_away_from_the_middle_unless_it_is_said() -> None:
         (ParametricSurface(torus, TURN, TURN, outward=-1), -1.0),
     ):
         node = random_rows(surface, 1, np.random.default_rng(3))
-        assert custom.custom_height(0, node, 1.0, 0.0, 0.0) * outside > 0.0
+        assert user_surface.custom_height(0, node, 1.0, 0.0, 0.0) * outside > 0.0
 
 
 def test_equal_sources_make_equal_surfaces() -> None:

@@ -28,10 +28,10 @@ from custom_shapes import (
 )
 
 import mjwrap as mw
-from mjwrap.custom.lanes import cosine, sine
-from mjwrap.custom_surfaces import CustomSurface, ImplicitSurface, ParametricSurface
-from mjwrap.kernels import custom, geodesics
 from mjwrap.kernels import layout as lay
+from mjwrap.kernels.geometry import geodesics, user_surface
+from mjwrap.surfaces.codegen.lanes import cosine, sine
+from mjwrap.surfaces.user import CustomSurface, ImplicitSurface, ParametricSurface
 
 CASES = 30
 ACCURACY = 1e-12  # promised for geodesics and their fields, relative
@@ -51,11 +51,11 @@ def moved(node: Array, which: int, size: float) -> Array:
     """Return the evaluated row after a natural variation: slid along t, shifted along b, turned, or lengthened."""
     one = node.copy()
     point = triple(one[0], lay.S_P)
-    normal = np.array(custom.custom_project(0, one, *point)[3:])
+    normal = np.array(user_surface.custom_project(0, one, *point)[3:])
     t = triple(one[0], lay.S_T).copy()
     b = np.cross(t, normal)
     if which < 2:
-        found = np.array(custom.custom_project(0, one, *(point + size * (t, b)[which])))
+        found = np.array(user_surface.custom_project(0, one, *(point + size * (t, b)[which])))
         one[0, lay.S_P : lay.S_P + 3], normal = found[:3], found[3:]
     elif which == 2:
         t = t + size * b
@@ -87,15 +87,15 @@ def test_points_are_projected_onto_the_surface_along_its_normal(surface: CustomS
     node = random_rows(surface, CASES, rng)
     for k in range(CASES):
         point = triple(node[k], lay.S_P)
-        there = np.array(custom.custom_project(k, node, *point))
+        there = np.array(user_surface.custom_project(k, node, *point))
         assert np.abs(there[:3] - point).max() < 1e-16
         assert np.linalg.norm(there[3:]) == pytest.approx(1.0, abs=1e-15)
         off = rng.uniform(-0.5, 0.5) * surface.size
         q = point + off * there[3:]
-        found = np.array(custom.custom_project(k, node, *q))
+        found = np.array(user_surface.custom_project(k, node, *q))
         assert np.linalg.norm(q - found[:3]) <= abs(off) + 1e-15
         assert np.abs(np.cross(q - found[:3], found[3:])).max() < 2e-9 * surface.size
-        assert custom.custom_height(k, node, *found[:3]) == pytest.approx(0.0, abs=1e-16)
+        assert user_surface.custom_height(k, node, *found[:3]) == pytest.approx(0.0, abs=1e-16)
 
 
 def test_heights_are_distances_to_first_order(surface: CustomSurface) -> None:
@@ -103,9 +103,11 @@ def test_heights_are_distances_to_first_order(surface: CustomSurface) -> None:
     node = random_rows(surface, CASES, rng)
     for k in range(CASES):
         point = triple(node[k], lay.S_P)
-        normal = np.array(custom.custom_project(k, node, *point)[3:])
+        normal = np.array(user_surface.custom_project(k, node, *point)[3:])
         for off in (1e-3 * surface.size, -1e-3 * surface.size):
-            assert custom.custom_height(k, node, *(point + off * normal)) == pytest.approx(off, rel=5e-3)
+            assert user_surface.custom_height(k, node, *(point + off * normal)) == pytest.approx(
+                off, rel=5e-3
+            )
 
 
 def test_anywhere_a_point_and_a_height_are_found(surface: CustomSurface) -> None:
@@ -119,11 +121,11 @@ def test_anywhere_a_point_and_a_height_are_found(surface: CustomSurface) -> None
         *rng.normal(size=(50, 3)) * 10.0,
     ]
     for point in points:
-        found = np.array(custom.custom_project(0, node, *point))
-        height = custom.custom_height(0, node, *point)
+        found = np.array(user_surface.custom_project(0, node, *point))
+        height = user_surface.custom_height(0, node, *point)
         assert np.isfinite(found).all()
         assert math.isfinite(height)
-        assert abs(custom.custom_height(0, node, *found[:3])) < 1e-12 * max(1.0, np.abs(point).max())
+        assert abs(user_surface.custom_height(0, node, *found[:3])) < 1e-12 * max(1.0, np.abs(point).max())
     if math.isfinite(surface.dims[0]):
         assert height > 0.0
 
@@ -144,7 +146,7 @@ def test_frames_are_orthonormal_on_the_surface(surface: CustomSurface) -> None:
     for k in range(CASES):
         for p, t, n in ((lay.W_P, lay.W_TP, lay.W_NP), (lay.W_Q, lay.W_TQ, lay.W_NQ)):
             point, tangent, normal = (triple(node[k], c) for c in (p, t, n))
-            there = np.array(custom.custom_project(k, node, *point))
+            there = np.array(user_surface.custom_project(k, node, *point))
             assert np.abs(there[:3] - point).max() < 1e-16
             assert np.abs(there[3:] - normal).max() < 1e-14
             assert abs(tangent @ normal) < 1e-15
@@ -270,7 +272,7 @@ def test_leaving_the_range_of_validity_is_noticed(make: Callable[[], CustomSurfa
     node[0, lay.S_T : lay.S_T + 3] = 0.0, 0.6, 0.8
     for arc, left in ((0.01, False), (0.02, True), (-0.2, False)):
         node[0, lay.S_ARC] = arc
-        custom.custom_geodesic(0, node)
+        user_surface.custom_geodesic(0, node)
         assert node[0, lay.W_ANGLE] == float(left)
         assert node[0, lay.W_Q + 2] == pytest.approx(0.19 + 0.8 * arc, abs=1e-14)  # found all the same
 

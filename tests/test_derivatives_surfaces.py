@@ -10,12 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from derivative_scenes import SURFACES, Array, exponential
-from scenes import rotation
 
 import mjwrap as mw
-from mjwrap.kernels import derivatives, geodesics, newton
 from mjwrap.kernels import layout as lay
+from mjwrap.kernels.geometry import geodesics
+from mjwrap.kernels.solved import hessian
+from mjwrap.kernels.tangency import newton
 from mjwrap.paths.scene import pack
+from mjwrap.verification.scenes import rotation
 
 CASES = 50
 STEP = 2e-4  # of the coarser quotient: 1e-5 m and 2e-4 rad
@@ -50,9 +52,9 @@ class Laid:
 
     def stops(self) -> tuple[int, int, Array]:
         """Return number of stops, fault, and stops, as the kernels have them."""
-        stop = np.empty((len(self.node) + 2, derivatives.STOP))
+        stop = np.empty((len(self.node) + 2, hessian.STOP))
         (ax, ay, az), (bx, by, bz) = self.origin, self.insertion
-        count, fault, _ = derivatives.list_stops(
+        count, fault, _ = hessian.list_stops(
             0, len(self.node), ax, ay, az, bx, by, bz, self.node, np.arange(len(self.node)), stop
         )
         return count, fault, stop
@@ -61,7 +63,7 @@ class Laid:
         """Return the gradient (n + 2, 6), and P, Q, s of every obstacle (n, 7)."""
         count, _, stop = self.stops()
         gradient = np.zeros((len(self.node) + 2, 6))
-        derivatives.add_gradient(count, stop, gradient)
+        hessian.add_gradient(count, stop, gradient)
         contacts = self.node[:, CONTACTS] + np.tile(self.origin, 2)
         return gradient, np.c_[contacts, self.node[:, lay.S_ARC]]
 
@@ -109,16 +111,13 @@ def lay_path(rng: np.random.Generator, kinds: str) -> Laid:
 def derivatives_of(path: Laid, direction: Array) -> tuple[Array, Array] | None:
     """Return the rates along a direction of what `state` returns, or None for a string that slips off."""
     count, fault, stop = path.stops()
-    if fault != derivatives.SOUND:
+    if fault != hessian.SOUND:
         return None
     slots = len(path.node) + 2
     rate, contacts = np.zeros((slots, 6)), np.zeros((slots - 2, 7))
-    derivatives.add_stiffness_times(count, direction, stop, rate)
+    hessian.add_stiffness_times(count, direction, stop, rate)
     rate[:, 3:] -= 0.5 * np.cross(path.state()[0][:, 3:], direction[:, 3:])
-    assert (
-        derivatives.contact_rates(count, direction, np.ones(slots - 2), stop, contacts)[0]
-        == derivatives.SOUND
-    )
+    assert hessian.contact_rates(count, direction, np.ones(slots - 2), stop, contacts)[0] == hessian.SOUND
     return rate, contacts
 
 
@@ -160,11 +159,11 @@ def test_hessian_is_symmetric(kinds: str) -> None:
     for _ in range(CASES):
         path = lay_path(rng, kinds)
         count, fault, stop = path.stops()
-        if fault != derivatives.SOUND:
+        if fault != hessian.SOUND:
             continue
         sound += 1
         slots = len(kinds) + 2
         work, matrix = np.empty((2, slots, 6)), np.empty((6 * slots, 6 * slots))
-        derivatives.stiffness(count, stop, work[0], work[1], matrix)
+        hessian.stiffness(count, stop, work[0], work[1], matrix)
         assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
     assert sound > CASES // 4

@@ -25,8 +25,8 @@ from doc_commands import PAGES, ROOT, Line
 
 import bootstrap
 import mjwrap as mw
-from mjwrap.cli import console
-from mjwrap.cli.main import COMMANDS
+from mjwrap.cli.common import console
+from mjwrap.cli.main import COMMANDS, module_of
 from mjwrap.video import offscreen
 
 LINES = [
@@ -92,7 +92,7 @@ def _mjwrap(words: list[str], line: Line, made: set[str]) -> str | None:
 
 def _parser(name: str) -> argparse.ArgumentParser:
     parser = console.Parser(f"mjwrap {name}", "")
-    importlib.import_module(f"mjwrap.cli.{name}").add_arguments(parser)
+    module_of(name).add_arguments(parser)
     return parser
 
 
@@ -192,7 +192,7 @@ def test_every_command_line_is_one_that_its_program_takes(monkeypatch: pytest.Mo
         "mjwrap run models/elbow/no.xml",
         "mjwrap replay out/no.rrd",
         "mjwrap simulate models/elbow/elbow.xml",
-        "python benchmarks/energy.py --frob",
+        "python benchmarks/robustness/energy.py --frob",
         "python benchmarks/no.py",
         "python docs/_figures/surfaces.py --frob",
         "pytest tests/test_paths.py -k frob",

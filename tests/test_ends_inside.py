@@ -14,11 +14,11 @@ import pytest
 from custom_shapes import MAKERS, RADII
 from derivative_scenes import SURFACES, exponential, times
 from numpy.typing import NDArray
-from scenes import nearest, outward
 
 import mjwrap as mw
-from mjwrap.kernels.foot import NOWHERE
+from mjwrap.kernels.spans.end_inside import NOWHERE
 from mjwrap.plugin import excitations, read
+from mjwrap.verification.scenes import nearest, outward
 
 Array = NDArray[np.float64]
 CUSTOM = "u"

@@ -13,10 +13,10 @@ from muscle_states import EACH_LAW, SIZES, Vector, evaluate, random_states, rows
 from scipy.integrate import quad, solve_ivp
 
 import mjwrap as mw
-from mjwrap.energetics import Energetics, compute_energetics, metabolic_constants
-from mjwrap.kernels import energetics as kernel
-from mjwrap.kernels import fiber as fiber_kernel
-from mjwrap.kernels import muscle as muscle_kernel
+from mjwrap.kernels.musculotendon import fiber as fiber_kernel
+from mjwrap.kernels.musculotendon import power as kernel
+from mjwrap.kernels.musculotendon import tension as muscle_kernel
+from mjwrap.muscles.energetics import Energetics, compute_energetics, metabolic_constants
 
 # ------------------------------------------------------------------------------------------------- powers
 

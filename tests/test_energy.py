@@ -10,7 +10,7 @@ import pytest
 from mjcf_reading import Vector
 
 import mjwrap as mw
-from benchmarks import energy
+from benchmarks.robustness import energy
 
 each_case = pytest.mark.parametrize(
     ("integrator", "timestep"), [(i, h) for i in energy.INTEGRATORS for h in energy.TIMESTEPS]

@@ -275,7 +275,7 @@ def test_points_on_both_sides_have_signed_distances() -> None:
 @pytest.mark.parametrize("kind", SHAPES)
 def test_derivatives_of_distances_at_second_order(kind: str) -> None:
     """By all unknowns, away from the start of the step too, at points inside and outside."""
-    from mjwrap.fitting.solve import Posed
+    from mjwrap.fitting.least_squares import Posed
 
     ratios = []
     for seed in range(50):

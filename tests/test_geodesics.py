@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mjwrap as mw
-from mjwrap.kernels import geodesics
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.shape import height, project
+from mjwrap.kernels.geometry import geodesics
+from mjwrap.kernels.geometry.projection import height, project
 from mjwrap.surfaces import Surface
 
 Array = NDArray[np.float64]

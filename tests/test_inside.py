@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
-from scenes import rotation
 from scipy.optimize import minimize
 
 import mjwrap as mw
+from mjwrap.verification.scenes import rotation
 
 Array = NDArray[np.float64]
 SURFACES = {"sphere": mw.Sphere, "cylinder": mw.Cylinder}

@@ -11,8 +11,8 @@ import pytest
 from muscle_states import EACH_LAW, SIZES, Vector, evaluate, random_states, rows
 
 import mjwrap as mw
-from mjwrap.energetics import metabolic_constants
 from mjwrap.errors import ModelError
+from mjwrap.muscles.energetics import metabolic_constants
 
 TABLE = Path(__file__).parent / "data" / "umberger2010.csv"
 

@@ -12,7 +12,7 @@ from declared_models import ARM, EXTENSOR, HILL, MUSCLE, compiled, declared, ele
 import mjwrap as mw
 from mjwrap.kernels import layout
 from mjwrap.mjcf import MuscleDeclaration, read_declarations
-from mjwrap.plan import build_plan
+from mjwrap.model.arrays import build_plan
 
 ORIGIN, INSERTION = element("site", "origin"), element("site", "insertion")
 WRAP_GEOMS = "elbow, egg, ulna, ball, palm, wrist"

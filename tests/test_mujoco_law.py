@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
-from mjwrap.kernels import muscle
+from mjwrap.kernels.musculotendon import tension as muscle
 
 ROUNDING = 1e-13  # relative to the largest force of the muscle: a dozen operations, some fused
 PRM = (0.75, 1.05, 400.0, 200.0, 0.5, 1.6, 1.5, 1.3, 1.2)

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from certificate import Case, findings
-from scenes import SURFACES, random_scene, reference_scene
-from shapes import Array
+from reference_paths import reference_scene
 
 import mjwrap as mw
-
-BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
+from mjwrap.verification.certificate import Case, findings
+from mjwrap.verification.scenes import SURFACES, random_scene
+from mjwrap.verification.shapes import Array
 
 
 @pytest.fixture
-def search(monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.syspath_prepend(BENCHMARKS)
-    return importlib.import_module("multistart")
+def search() -> Any:
+    return importlib.import_module("mjwrap.verification.multistart")
 
 
 def scene_of(scene: dict[str, Any], pose: dict[str, Any]) -> tuple[Array, Array, list[mw.Obstacle]]:
@@ -85,7 +82,7 @@ def test_both_ways_round_a_cylinder_are_found(search: Any) -> None:
 def test_rays_and_strings_agree_on_the_shortest(search: Any, letter: str) -> None:
     """Two searches that share nothing but the polish: strings find nothing shorter than the shortest ray's path."""
     rng = np.random.default_rng(3)
-    rows = importlib.import_module("multistart_rows")
+    rows = importlib.import_module("mjwrap.verification.multistart_rows")
     same = 0
     for _ in range(8):
         origin, insertion, row = random_scene(rng, letter, hints=False)

@@ -10,8 +10,8 @@ import pytest
 from hill_tables import LAWS, row
 from mjcf_reading import Vector
 
-from mjwrap.kernels import activation as dynamics
-from mjwrap.kernels import balance, bezier, degroote_fregly, fiber, millard
+from mjwrap.kernels.musculotendon import activation_dynamics as dynamics
+from mjwrap.kernels.musculotendon import bezier, degroote_fregly, equilibrium, fiber, millard
 
 # F_max [N], l_o [m], l_s [m], pennation [rad], v_max [l_o/s], damping
 MUSCLES = {
@@ -91,10 +91,10 @@ def test_finite_input_gives_a_finite_tension_that_pulls(law: str, sizes: str) ->
         ):
             assert math.isfinite(new)
             assert 0.0 <= tension < math.inf
-            assert status != fiber.NOT_CONVERGED
+            assert status != equilibrium.NOT_CONVERGED
         new, _, status = fiber.equilibrium(code, params, 0, a, length)
         assert math.isfinite(new)
-        assert status != fiber.NOT_CONVERGED
+        assert status != equilibrium.NOT_CONVERGED
         assert math.isfinite(fiber.fiber_rate(code, params, 0, a, length, max(x, 1e-12)))
         assert 0.0 <= fiber.rigid_tension(code, params, 0, a, length, speed) < math.inf
 
@@ -190,7 +190,7 @@ def test_evaluations_of_a_simulation(law: str, sizes: str, duration: float) -> N
         x, _, evaluations, status = fiber.step_fiber(
             code, params, 0, a, new, rate, ends[0], ends[1], speed, x, duration
         )
-        assert status != fiber.NOT_CONVERGED
+        assert status != equilibrium.NOT_CONVERGED
         count.append(evaluations)
         a = new
     assert max(count) <= 10
@@ -284,10 +284,10 @@ def test_slopes_of_the_balance(law: str, sizes: str) -> None:
         at = np.array([reach, x, a, v])
 
         def both(at: Vector) -> Vector:
-            found = balance.forces(code, at[2], damping, height, ratio, at[0], at[1], at[3])
+            found = equilibrium.forces(code, at[2], damping, height, ratio, at[0], at[1], at[3])
             return np.array([found[0], found[2]])
 
-        _, d_pull, _, d_force, stiffness, strength, drag = balance.forces(
+        _, d_pull, _, d_force, stiffness, strength, drag = equilibrium.forces(
             code, a, damping, height, ratio, reach, x, v
         )
         known = np.array([[stiffness, 0.0], [d_pull, d_force], [0.0, strength], [0.0, drag]])

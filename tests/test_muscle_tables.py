@@ -11,7 +11,7 @@ import pytest
 from hill_tables import LAWS, SIZES, elastic, row, table, values
 from mjcf_reading import Vector
 
-from mjwrap.kernels import activation, degroote_fregly, fiber, millard
+from mjwrap.kernels.musculotendon import activation_dynamics, degroote_fregly, fiber, millard
 
 PRINTED = (
     5e-15  # relative: the tables have 15 significant digits, so half a unit of the last is at worst this
@@ -190,8 +190,8 @@ def held(time: float, start: float) -> tuple[float, float, float, float]:
     """Return activation, its rate, length and speed of `ref_traj_millard_step`: fixed ends, stepped excitation."""
     if time <= ONSET:
         return 0.05, 0.0, start, 0.0
-    a = activation.advance_activation(0.05, 0.8, 0.01, 0.04, time - ONSET)
-    return a, activation.zajac_rate(0.8, a, 0.01, 0.04), start, 0.0
+    a = activation_dynamics.advance_activation(0.05, 0.8, 0.01, 0.04, time - ONSET)
+    return a, activation_dynamics.zajac_rate(0.8, a, 0.01, 0.04), start, 0.0
 
 
 def shaken(time: float, start: float, optimal: float) -> tuple[float, float, float, float]:

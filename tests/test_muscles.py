@@ -10,8 +10,8 @@ import pytest
 from hill_tables import row, values
 
 import mjwrap as mw
-from mjwrap.kernels import degroote_fregly as curves
-from mjwrap.kernels import muscle
+from mjwrap.kernels.musculotendon import degroote_fregly as curves
+from mjwrap.kernels.musculotendon import tension as muscle
 
 ROUNDING = 1e-15  # of sums of terms near one, where the result is near zero
 TWIN = 1e-12  # relative: two ways to write the same formula

@@ -7,12 +7,14 @@ import itertools
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import random_scene
 
 import mjwrap as mw
-from mjwrap.kernels import chain, geodesics, newton, stoermer
 from mjwrap.kernels import layout as lay
+from mjwrap.kernels.geometry import geodesics, stoermer
+from mjwrap.kernels.spans import chain
+from mjwrap.kernels.tangency import newton
 from mjwrap.paths.scene import pack
+from mjwrap.verification.scenes import random_scene
 
 Array = NDArray[np.float64]
 ROWS = ["c", "s", "cc", "sc", "css", "cscc", "csccs"]

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import SURFACES, Array, check_path, height, outward, random_scene, reference_scene
+from reference_paths import reference_scene
 
 import mjwrap as mw
+from mjwrap.verification.scenes import SURFACES, Array, check_path, height, outward, random_scene
 
 EXACT = 1e-12  # relative: what the references are good for (closed forms are met by them to 1e-16)
 SCENES = ["a_cyl", "b_sphere", "c_ellipsoid", "d_torus", "e3_mixed", "f_cyl01", "f_cyl02", "f_cyl04"]

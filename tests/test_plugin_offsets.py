@@ -12,7 +12,7 @@ import pytest
 from mujoco.introspect import structs
 
 from mjwrap.errors import VersionError
-from mjwrap.plugin import offsets as off
+from mjwrap.plugin.mujoco_c import offsets as off
 
 XML = """
 <mujoco>

@@ -13,7 +13,7 @@ import mjwrap as mw
 from mjwrap.plugin import installing
 
 # that a spec may have a plugin cannot be taken back; it means nothing without an instance
-MENTION = r'\n *<extension>\s*<plugin plugin="mjwrap.muscles"/>\s*</extension>\n'
+MENTION = r'\n *<extension>\s*<plugin plugin="mjwrap.muscles.laws"/>\s*</extension>\n'
 
 
 @pytest.mark.parametrize("before", [None, "wrench", "transmission"])

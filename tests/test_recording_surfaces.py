@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
-from mjwrap.meshes import surface_grid, triangles
+from mjwrap.surfaces.triangles import surface_grid, triangles
 
 pytest.importorskip("rerun", reason="recordings need the rerun-sdk package")
 

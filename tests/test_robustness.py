@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from certificate import findings, rotation
-from scenes import gap, height
 
 import mjwrap as mw
+from mjwrap.verification.certificate import findings, rotation
+from mjwrap.verification.scenes import gap, height
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
-    monkeypatch.syspath_prepend(BENCHMARKS)
+    monkeypatch.syspath_prepend(BENCHMARKS / "robustness")
     return importlib.import_module
 
 
@@ -201,12 +201,12 @@ def test_a_jump_is_found_where_the_path_goes_on(
 @pytest.mark.parametrize(
     ("script", "arguments", "message"),
     [
-        ("robustness.py", ["--scenes", "0"], "--scenes must be at least 1"),
-        ("robustness.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("robustness.py", ["--replay", "no/such.json"], "--replay takes the file"),
-        ("robustness.py", ["--classes", "square"], "invalid choice"),
-        ("motion.py", ["--poses", "5"], "--poses must be at least 101"),
-        ("motion.py", ["--save", "no/such/x.json"], "there is no folder"),
+        ("robustness/robustness.py", ["--scenes", "0"], "--scenes must be at least 1"),
+        ("robustness/robustness.py", ["--json", "no/such/x.json"], "there is no folder"),
+        ("robustness/robustness.py", ["--replay", "no/such.json"], "--replay takes the file"),
+        ("robustness/robustness.py", ["--classes", "square"], "invalid choice"),
+        ("robustness/motion.py", ["--poses", "5"], "--poses must be at least 101"),
+        ("robustness/motion.py", ["--save", "no/such/x.json"], "there is no folder"),
     ],
 )
 def test_bad_arguments_are_refused(script: str, arguments: list[str], message: str) -> None:

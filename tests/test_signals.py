@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
-from mjwrap.excitation import Excitation
-from mjwrap.signals import Constant, Samples, Sine, parse_pattern, pattern_forms
+from mjwrap.runs.excitation import Excitation
+from mjwrap.runs.signals import Constant, Samples, Sine, parse_pattern, pattern_forms
 
 TWO = """
 <mujoco>

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import LETTERS, Array, check_path, height, random_scene
 from test_surface_paths import EXACT, every_surface
 
 import mjwrap as mw
+from mjwrap.verification.scenes import LETTERS, Array, check_path, height, random_scene
 
 FINE = 120  # steps of a pull against which one, two and three are held
 PULLS = 8  # of each shape

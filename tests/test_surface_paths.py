@@ -7,9 +7,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import LETTERS, Array, check_path, height, local, nearest, outward, random_scene
 
 import mjwrap as mw
+from mjwrap.verification.scenes import (
+    LETTERS,
+    Array,
+    check_path,
+    height,
+    local,
+    nearest,
+    outward,
+    random_scene,
+)
 
 EXACT = 1e-12  # relative: two ways to the same path
 NAMES = {"c": "cylinder", "s": "sphere", "e": "ellipsoid", "l": "elliptic cylinder"}

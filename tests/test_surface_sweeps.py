@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import LETTERS, Array, check_path, height, random_scene
 from test_surface_paths import EXACT, crossing, every_surface
 
 import mjwrap as mw
+from mjwrap.verification.scenes import LETTERS, Array, check_path, height, random_scene
 
 
 def rise(rng: np.random.Generator, letter: str, steps: int) -> tuple[Array, Array, mw.Obstacle, Array, Array]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import Array, check_path, height, local
 
 import mjwrap as mw
+from mjwrap.verification.scenes import Array, check_path, height, local
 
 EXACT = 1e-12  # relative: two ways to the same path
 

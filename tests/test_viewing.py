@@ -19,9 +19,10 @@ from test_plugin_offsets import without
 
 import mjwrap as mw
 from mjwrap.errors import VersionError
-from mjwrap.plugin import install, offsets, viewing
+from mjwrap.plugin import install
 from mjwrap.plugin.callbacks import block as bk
-from mjwrap.plugin.library import library
+from mjwrap.plugin.mujoco_c import offsets, visualisation
+from mjwrap.plugin.mujoco_c.library import library
 from mjwrap.plugin.readout import block_address
 
 VIS, CAT, OBJ, GEOM = mujoco.mjtVisFlag, mujoco.mjtCatBit, mujoco.mjtObj, mujoco.mjtGeom
@@ -384,16 +385,16 @@ def test_structs_that_are_not_as_declared_are_refused(
 ) -> None:
     """Muscles then run without being drawn, and a warning says why."""
     declared_structs = without(struct, field)
-    monkeypatch.setattr(viewing, "structs", lambda: declared_structs)
+    monkeypatch.setattr(visualisation, "structs", lambda: declared_structs)
     monkeypatch.setattr(offsets, "structs", lambda: declared_structs)
     with pytest.raises(VersionError, match="cannot run in MuJoCo"):
-        viewing._find()
+        visualisation._find()
     with pytest.warns(RuntimeWarning, match="not drawn"):
-        assert viewing.drawing.__wrapped__() is None
+        assert visualisation.drawing.__wrapped__() is None
 
 
 def test_without_a_way_to_draw_muscles_run_unseen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mjwrap.plugin.image.drawing", lambda: None)
+    monkeypatch.setattr("mjwrap.plugin.blocks.image.drawing", lambda: None)
     model = install(spec_of(SCENES["arm"].replace('force="400"', 'force="401"')))
     data = moving(model)
     mujoco.mj_step(model, data, nstep=3)

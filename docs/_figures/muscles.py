@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import mjwrap as mw
-from mjwrap.kernels import fiber
+from mjwrap.kernels.musculotendon import fiber
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 LAWS: dict[str, Any] = {"De Groote–Fregly 2016": mw.DeGrooteFregly2016, "Millard 2012": mw.Millard2012}

@@ -23,7 +23,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import mjwrap as mw
 from mjwrap import fitting
-from mjwrap.meshes import surface_grid, triangles
+from mjwrap.surfaces.triangles import surface_grid, triangles
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 BLUE, RED, YELLOW = "#4878a8", "#c03030", "#e0a010"

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from mjwrap.errors import ModelError
-from mjwrap.muscles import DeGrooteFregly2016, MuJoCoMuscle
+from mjwrap.muscles.laws import DeGrooteFregly2016, MuJoCoMuscle
 
 MUJOCO_RANGE = (0.75, 1.05)  # of normalised fibre lengths: MuJoCo's default
 WIDE_RANGE = (0.5, 1.5)  # where the active force-length curve is well above zero

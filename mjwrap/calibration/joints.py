@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf import MuscleDeclaration, name_of, names
-from mjwrap.poses import Coupling, read_couplings
+from mjwrap.poses.joint_sweeps import Coupling, read_couplings
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -15,12 +15,12 @@ from mjwrap.calibration.fibers import mujoco_peak_force
 from mjwrap.calibration.ranges import LengthRange, length_ranges
 from mjwrap.calibration.report import Finding, Implausible, ParameterLimits, ParameterReport
 from mjwrap.errors import ModelError, StateError
-from mjwrap.kernels import muscle as laws
+from mjwrap.kernels.musculotendon import tension as laws
 from mjwrap.mjcf import name_of
 from mjwrap.mjcf.actuators import mujoco_law
-from mjwrap.muscles import Law, MuJoCoMuscle, PathActuator
+from mjwrap.muscles.laws import Law, MuJoCoMuscle, PathActuator
 from mjwrap.system import MuscleSystem
-from mjwrap.wording import counted
+from mjwrap.text import counted
 
 Found = Iterator[tuple[Implausible, float, float, str]]
 

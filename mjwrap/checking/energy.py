@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.outcome import Check
 from mjwrap.errors import ModelError, StateError
-from mjwrap.poses import read_couplings
+from mjwrap.poses.joint_sweeps import read_couplings
 from mjwrap.system import MuscleSystem
-from mjwrap.wording import counted
+from mjwrap.text import counted
 
 Array = NDArray[np.float64]
 SECONDS, ACTIVATION, LIMIT = 0.1, 0.1, 1e-6

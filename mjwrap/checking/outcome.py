@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.wording import counted
+from mjwrap.text import counted
 
 Array = NDArray[np.float64]
 

@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 
 from mjwrap.checking.outcome import Check
-from mjwrap.continuity import NARROW
 from mjwrap.paths import Status
-from mjwrap.poses import PoseMaker
+from mjwrap.poses.continuity import NARROW
+from mjwrap.poses.joint_sweeps import PoseMaker
+from mjwrap.poses.walking import Walker
 from mjwrap.system import MuscleSystem
-from mjwrap.walking import Walker
-from mjwrap.wording import counted
+from mjwrap.text import counted
 
 MODELS = (Status.ENDPOINT_INSIDE, Status.OUT_OF_RANGE)  # where the model is such that there is no path
 

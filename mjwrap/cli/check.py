@@ -19,12 +19,12 @@ import argparse
 import contextlib
 
 from mjwrap.checking import check_model
-from mjwrap.cli.arguments import add_model, at_least
-from mjwrap.cli.errors import FAULTS
-from mjwrap.cli.models import load, start_keyframe, start_state
-from mjwrap.cli.output import Report, add_json
-from mjwrap.cli.progress import Stages
-from mjwrap.wording import counted
+from mjwrap.cli.common.arguments import add_model, at_least
+from mjwrap.cli.common.errors import FAULTS
+from mjwrap.cli.common.models import load, start_keyframe, start_state
+from mjwrap.cli.common.output import Report, add_json
+from mjwrap.cli.common.progress import Stages
+from mjwrap.text import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

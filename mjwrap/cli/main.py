@@ -7,11 +7,12 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 
 import mjwrap
-from mjwrap.cli import console
-from mjwrap.cli.errors import RUN_FAILED, USER_ERROR, RunError
-from mjwrap.cli.output import note_inputs, say, written
+from mjwrap.cli.common import console
+from mjwrap.cli.common.errors import RUN_FAILED, USER_ERROR, RunError
+from mjwrap.cli.common.output import note_inputs, say, written
 
 COMMANDS = {
     "run": "simulate a model with its muscles along geodesic paths",
@@ -80,8 +81,14 @@ def _command(given: list[str]) -> int:
     return console.run(f"mjwrap {first}", lambda: _execute(first, given[1:]))
 
 
+def module_of(name: str) -> ModuleType:
+    """Return the module of a command, which has its help text, `add_arguments` and `execute`."""
+    room = importlib.import_module(f"mjwrap.cli.{name}")
+    return importlib.import_module(f"{room.__name__}.command") if hasattr(room, "__path__") else room
+
+
 def _execute(name: str, arguments: list[str]) -> int:
-    command = importlib.import_module(f"mjwrap.cli.{name}")
+    command = module_of(name)
     parser = console.Parser(f"mjwrap {name}", command.__doc__ or "")
     command.add_arguments(parser)
     options = parser.parse_args(arguments)

@@ -22,11 +22,11 @@ import numpy as np
 from numba.core import event
 
 import mjwrap as mw
-from mjwrap.cli.models import load
-from mjwrap.cli.output import Report, add_json
+from mjwrap.cli.common.models import load
+from mjwrap.cli.common.output import Report, add_json
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels import _jit
-from mjwrap.wording import counted
+from mjwrap.text import counted
 
 SCENE = """
 <mujoco>

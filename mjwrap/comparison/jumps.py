@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
 from mjwrap.comparison.verdict import slope
-from mjwrap.continuity import NARROW, odd_intervals, refine_jump
-from mjwrap.poses import Motion, PoseMaker
-from mjwrap.walking import Found, Place
-from mjwrap.wording import counted
+from mjwrap.poses.continuity import NARROW, odd_intervals, refine_jump
+from mjwrap.poses.joint_sweeps import Motion, PoseMaker
+from mjwrap.poses.walking import Found, Place
+from mjwrap.text import counted
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import MjwrapError
-from mjwrap.excitation import Excitation
 from mjwrap.mjcf import dof_names, name_of
+from mjwrap.model.takeover import Takeover
+from mjwrap.runs.excitation import Excitation
 from mjwrap.system import MuscleSystem
-from mjwrap.takeover import Takeover
 
 Array = NDArray[np.float64]
 _UNSTABLE = (

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
-from mjwrap.wording import counted
+from mjwrap.text import counted
 
 
 class Verdict(NamedTuple):

@@ -11,11 +11,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.geometry import ANGLE, HELD, Fault, judge, judge_held
+from mjwrap.comparison.judge_geodesic import ANGLE, HELD, Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
-from mjwrap.poses import Motion
+from mjwrap.poses.joint_sweeps import Motion
+from mjwrap.poses.walking import Walk, Walker
 from mjwrap.system import MuscleSystem
-from mjwrap.walking import Walk, Walker
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.geometry import Fault
+from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.twins import PathRecord, Twin
 from mjwrap.mjcf import name_of
 from mjwrap.paths import Status
-from mjwrap.poses import Motion
+from mjwrap.poses.joint_sweeps import Motion
 
 Array = NDArray[np.float64]
 AGREE = 1e-9  # [m, m/s, m/rad] two true geodesics on one branch agree to this

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from mjwrap.errors import GeometryError
 from mjwrap.fitting import shapes
-from mjwrap.fitting.frames import settled
+from mjwrap.fitting.least_squares import LOST, growth, solve
 from mjwrap.fitting.shapes import Array, Shape
-from mjwrap.fitting.solve import LOST, growth, solve
+from mjwrap.fitting.symmetry import settled
 from mjwrap.paths import Obstacle
 from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
 

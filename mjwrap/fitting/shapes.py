@@ -13,7 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.surfaces import Capsule, Cone, Cylinder, Ellipsoid, EllipticCylinder, Sphere, Surface, Torus
+from mjwrap.surfaces import (
+    Capsule,
+    Cone,
+    Cylinder,
+    Ellipsoid,
+    EllipticCylinder,
+    Sphere,
+    Surface,
+    Torus,
+)
 
 Array = NDArray[np.float64]
 NEWTON = 60  # iterations at most; eight are the rule

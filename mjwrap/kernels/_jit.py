@@ -34,7 +34,7 @@ _FIRST, _FURTHER = (
 def source_hash() -> str:
     """Return 16 hexadecimal digits that change with any kernel source, numba's version or bounds checking."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]} {_boundscheck()}".encode())
-    for file in sorted(_HERE.glob("*.py")):
+    for file in sorted(_HERE.rglob("*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -5,7 +5,7 @@ float64 array `node` (N, ROW): one argument instead of seven, because numba hand
 holds, in this order:
 
     KIND        VIA, CYLINDER, SPHERE, ...
-    DIM   (4)   sizes of the surface [m], in the order of its class in `mjwrap/surfaces.py`
+    DIM   (4)   sizes of the surface [m], in the order of its class in `mjwrap/surfaces/primitives.py`
     SIZE        length by which steps on the surface are limited, about its smallest radius of curvature [m]
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major

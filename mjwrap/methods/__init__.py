@@ -5,11 +5,11 @@
 
 from mjwrap.methods.bfgs import Bfgs
 from mjwrap.methods.broyden import Broyden
-from mjwrap.methods.chain import MethodResult, solve_chain
 from mjwrap.methods.iteration import Outcome, iterate
 from mjwrap.methods.newton_raphson import NewtonRaphson
 from mjwrap.methods.problem import ChainProblem
 from mjwrap.methods.registry import METHODS, make_solver
+from mjwrap.methods.whole_path import MethodResult, solve_chain
 
 __all__ = [
     "METHODS",

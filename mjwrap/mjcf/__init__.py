@@ -6,7 +6,7 @@ whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing
 
 from mjwrap.mjcf.actuators import EARLY_DYNAMICS, keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
-from mjwrap.mjcf.files import read_model
+from mjwrap.mjcf.loading import read_model
 from mjwrap.mjcf.names import act_names, dof_names, has_plugin, name_of, names, qpos_names
 from mjwrap.mjcf.reader import read_declarations
 from mjwrap.mjcf.routes import tendon_stops

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 
 from mjwrap.errors import ModelError
-from mjwrap.kernels import early
+from mjwrap.kernels.musculotendon import early_activation
 from mjwrap.mjcf.inside import end_is_inside, side_is_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import geoms_of, tendon_stops
-from mjwrap.muscles import MuJoCoMuscle
+from mjwrap.muscles.laws import MuJoCoMuscle
 
 OBJ = mujoco.mjtObj
 _GAINS = [
@@ -27,10 +27,10 @@ _BIASES = [
 _NO_BIAS, _MUSCLE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
 _DYN = mujoco.mjtDyn
 EARLY_DYNAMICS = {  # dyntypes whose next activation the kernels know
-    int(_DYN.mjDYN_INTEGRATOR): early.INTEGRATOR,
-    int(_DYN.mjDYN_FILTER): early.FILTER,
-    int(_DYN.mjDYN_FILTEREXACT): early.FILTER_EXACT,
-    int(_DYN.mjDYN_MUSCLE): early.MUSCLE,
+    int(_DYN.mjDYN_INTEGRATOR): early_activation.INTEGRATOR,
+    int(_DYN.mjDYN_FILTER): early_activation.FILTER,
+    int(_DYN.mjDYN_FILTEREXACT): early_activation.FILTER_EXACT,
+    int(_DYN.mjDYN_MUSCLE): early_activation.MUSCLE,
 }
 
 

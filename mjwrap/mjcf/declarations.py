@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from mjwrap.activation import ActivationDynamics
-from mjwrap.muscles import Law
+from mjwrap.muscles.activation import ActivationDynamics
+from mjwrap.muscles.laws import Law
 from mjwrap.surfaces import Surface
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from mjwrap.activation import FORMS, ActivationDynamics
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.actuators import curves_reason, is_muscle, keeps_state, mujoco_law, tendon_reason
 from mjwrap.mjcf.names import listed, name_of
-from mjwrap.mjcf.surfaces import SIZES
-from mjwrap.muscles import TENDONS, ActuatorForce, DeGrooteFregly2016, Law, Millard2012, PathActuator
-from mjwrap.wording import counted
+from mjwrap.mjcf.wrapping_geoms import SIZES
+from mjwrap.muscles.activation import FORMS, ActivationDynamics
+from mjwrap.muscles.laws import TENDONS, ActuatorForce, DeGrooteFregly2016, Law, Millard2012, PathActuator
+from mjwrap.text import counted
 
 OBJ = mujoco.mjtObj
 TIMES, SMOOTHING = "activation_time_constants", "activation_smoothing"

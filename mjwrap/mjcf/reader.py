@@ -11,7 +11,7 @@ from mjwrap.mjcf.inside import shares_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.tuples import read_tuple
-from mjwrap.muscles import ActuatorForce
+from mjwrap.muscles.laws import ActuatorForce
 
 OBJ = mujoco.mjtObj
 

@@ -11,7 +11,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.declarations import Node, Route
 from mjwrap.mjcf.inside import end_is_inside, is_beside, side_is_inside
 from mjwrap.mjcf.names import listed, name_of, names
-from mjwrap.mjcf.surfaces import read_surface, wrapping_geoms
+from mjwrap.mjcf.wrapping_geoms import read_surface, wrapping_geoms
 
 OBJ = mujoco.mjtObj
 

@@ -23,7 +23,7 @@ from mjwrap.mjcf.parameters import (
     read_texts,
 )
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
-from mjwrap.mjcf.surfaces import size_keys
+from mjwrap.mjcf.wrapping_geoms import size_keys
 
 OBJ = mujoco.mjtObj
 MARKS = {

@@ -7,7 +7,6 @@ from typing import Any
 
 import mujoco
 
-from mjwrap.activation import ActivationDynamics
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed
 from mjwrap.mjcf.parameters import (
@@ -21,8 +20,9 @@ from mjwrap.mjcf.parameters import (
     TEXTS,
     TIMES,
 )
-from mjwrap.mjcf.surfaces import SIZES
-from mjwrap.muscles import DeGrooteFregly2016, Millard2012
+from mjwrap.mjcf.wrapping_geoms import SIZES
+from mjwrap.muscles.activation import ActivationDynamics
+from mjwrap.muscles.laws import DeGrooteFregly2016, Millard2012
 
 OBJ = mujoco.mjtObj
 HillLaw = DeGrooteFregly2016 | Millard2012

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError, PathError
-from mjwrap.kernels import derivatives, layout
+from mjwrap.kernels import layout
+from mjwrap.kernels.solved import hessian
 from mjwrap.paths.scene import Array, Point, vector
 from mjwrap.paths.status import Status
 
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
     from mjwrap.paths.solution import Contact
 
 FAULTS = {
-    derivatives.VANISHING: "the straight segment that leaves {0} has no length, so its direction has no derivative",
-    derivatives.MARGINAL: "its contact with {0} could slip sideways without a change of length",
-    derivatives.FLAT: "the surface of {0} is flat along the path where it touches, so the contact has no one place",
+    hessian.VANISHING: "the straight segment that leaves {0} has no length, so its direction has no derivative",
+    hessian.MARGINAL: "its contact with {0} could slip sideways without a change of length",
+    hessian.FLAT: "the surface of {0} is flat along the path where it touches, so the contact has no one place",
 }
 
 
@@ -87,15 +88,15 @@ class Derivatives:
         return f"{'via point' if via else 'obstacle'} {slot - 1}"
 
     def _raise(self, what: str, fault: int, slot: int) -> None:
-        if fault != derivatives.SOUND:
+        if fault != hessian.SOUND:
             raise GeometryError(f"the path has no {what} here: {FAULTS[fault].format(self._slot(slot))}")
 
     def _stops(self, what: str, strict: bool = True) -> tuple[int, Array]:
         """Return the number of stops and their rows; raise where the path was not found or, if strict, for a fault."""
         if self.status != Status.CONVERGED:
             raise PathError(f"the path has no {what}: {self.status.message}")
-        stop = np.empty((len(self._node) + 2, derivatives.STOP))
-        count, fault, slot = derivatives.list_stops(*self._ends, self._node, self._owner, stop)
+        stop = np.empty((len(self._node) + 2, hessian.STOP))
+        count, fault, slot = hessian.list_stops(*self._ends, self._node, self._owner, stop)
         if strict:
             self._raise(what, fault, slot)
         return count, stop
@@ -108,7 +109,7 @@ class Derivatives:
         """
         count, stop = self._stops("gradient", strict=False)
         out = np.zeros((len(self.contacts) + 2, 6))
-        derivatives.add_gradient(count, stop, out)
+        hessian.add_gradient(count, stop, out)
         return out
 
     def stiffness(self) -> Array:
@@ -123,7 +124,7 @@ class Derivatives:
         count, stop = self._stops("stiffness")
         slots = len(self.contacts) + 2
         twist, out, matrix = np.empty((slots, 6)), np.empty((slots, 6)), np.empty((6 * slots, 6 * slots))
-        derivatives.stiffness(count, stop, twist, out, matrix)
+        hessian.stiffness(count, stop, twist, out, matrix)
         return matrix
 
     def stiffness_times(self, direction: ArrayLike) -> Array:
@@ -137,7 +138,7 @@ class Derivatives:
         if given.shape != shape or not np.isfinite(given).all():
             raise GeometryError(f"direction must be finite and have shape {shape}, not {given.shape}")
         out = np.zeros(shape)
-        derivatives.add_stiffness_times(count, given, stop, out)
+        hessian.add_stiffness_times(count, given, stop, out)
         return out
 
     def contact_velocities(
@@ -152,7 +153,7 @@ class Derivatives:
         twist = self._twists(origin_velocity, insertion_velocity, twists)
         rates = np.zeros((len(self._node), 7))
         size = np.ascontiguousarray(self._node[:, layout.SIZE])
-        self._raise("contact velocities", *derivatives.contact_rates(count, twist, size, stop, rates))
+        self._raise("contact velocities", *hessian.contact_rates(count, twist, size, stop, rates))
         found: list[ContactVelocity] = []
         for row, k in enumerate(self._owner):
             one = self._contact_velocity(row, twist[k + 1], rates[row])

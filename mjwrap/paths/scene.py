@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import chain, layout
+from mjwrap.kernels import layout
+from mjwrap.kernels.spans import chain
 from mjwrap.surfaces import Cylinder, Sphere, Surface
 
 Array = NDArray[np.float64]

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import foot, layout, polyline, segments
+from mjwrap.kernels import layout
+from mjwrap.kernels.solved import polyline, segments
+from mjwrap.kernels.spans import end_inside
 from mjwrap.paths.derivatives import Derivatives
 from mjwrap.paths.scene import SAVED, Array, Point
 from mjwrap.paths.status import Status
@@ -59,12 +61,12 @@ class PathSolution(Derivatives):
         self.tangency_error = float(info[layout.I_ERROR])
         self.iterations = int(info[layout.I_ITERATIONS])
         self.evaluations = int(info[layout.I_EVALUATIONS])
-        known = foot.has_length(self.status, self.tangency_error)
+        known = end_inside.has_length(self.status, self.tangency_error)
         self._saved = self._node[:, SAVED].copy() if known else saved_before.copy()
         if self.status == Status.ENDPOINT_INSIDE and not known:
             self._saved[:, 0] = layout.COLD  # where a string comes out again is anybody's guess
         stands_in = known and not self.converged
-        list_them = foot.list_standing if stands_in else segments.list_segments
+        list_them = end_inside.list_standing if stands_in else segments.list_segments
         self._count = list_them(*self._ends, self._node, self._segments, 0)
         self.contacts = []
         for row, k in enumerate(self._owner):

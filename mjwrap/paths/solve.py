@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import chain, layout
+from mjwrap.kernels import layout
+from mjwrap.kernels.spans import chain
 from mjwrap.paths.scene import SAVED, Array, Obstacle, Point, ViaPoint, owners, pack, point
 from mjwrap.paths.solution import PathSolution
 

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import read_declarations, read_model
-from mjwrap.muscles import ActuatorForce
+from mjwrap.model.takeover import Takeover
+from mjwrap.muscles.laws import ActuatorForce
 from mjwrap.plugin import register as reg
-from mjwrap.plugin.image import loaded_bodies, state_size
-from mjwrap.plugin.placeholders import drop_placeholders, hide_placeholders, show_placeholder
-from mjwrap.plugin.resting import rest_actuators
-from mjwrap.plugin.transmission import check_room
-from mjwrap.plugin.undo import undone_on_error
-from mjwrap.plugin.viewing import drawing
-from mjwrap.takeover import Takeover
+from mjwrap.plugin.blocks.image import loaded_bodies, state_size
+from mjwrap.plugin.blocks.transmission_part import check_room
+from mjwrap.plugin.mujoco_c.visualisation import drawing
+from mjwrap.plugin.spec.placeholders import drop_placeholders, hide_placeholders, show_placeholder
+from mjwrap.plugin.spec.resting import rest_actuators
+from mjwrap.plugin.spec.undo import undone_on_error
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
-from mjwrap.kernels import layout, segments
+from mjwrap.kernels import layout
+from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import Declarations
 from mjwrap.plugin import register as reg
 from mjwrap.plugin.callbacks import block as bk

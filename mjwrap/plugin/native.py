@@ -7,10 +7,10 @@ import copy
 import mujoco
 
 from mjwrap.mjcf import read_declarations
-from mjwrap.plugin.placeholders import restore_placeholders
+from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.readout import instances
 from mjwrap.plugin.register import TRANSMISSION, claim_of, hush_to_silence
-from mjwrap.takeover import Takeover
+from mjwrap.plugin.spec.placeholders import restore_placeholders
 
 
 def native(model: mujoco.MjModel) -> dict[str, str]:

@@ -24,20 +24,20 @@ import numpy as np
 from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf import MuscleDeclaration, read_declarations
 from mjwrap.mjcf.names import PLUGIN_INSTANCE as INSTANCE
-from mjwrap.plan import Plan, build_plan
+from mjwrap.model.arrays import Plan, build_plan
+from mjwrap.model.takeover import Takeover
+from mjwrap.plugin.blocks.image import block_image, renew, state_size
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import owners
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries, compile_hooks
-from mjwrap.plugin.copies import copy_of
-from mjwrap.plugin.fingerprint import fingerprint
-from mjwrap.plugin.image import block_image, renew, state_size
-from mjwrap.plugin.library import MjpPlugin, library
-from mjwrap.plugin.offsets import offsets, verify_plugin_fields
-from mjwrap.plugin.placeholders import restore_placeholders
-from mjwrap.plugin.viewing import drawing
-from mjwrap.takeover import Takeover
+from mjwrap.plugin.mujoco_c.copies import copy_of
+from mjwrap.plugin.mujoco_c.fingerprint import fingerprint
+from mjwrap.plugin.mujoco_c.library import MjpPlugin, library
+from mjwrap.plugin.mujoco_c.offsets import offsets, verify_plugin_fields
+from mjwrap.plugin.mujoco_c.visualisation import drawing
+from mjwrap.plugin.spec.placeholders import restore_placeholders
 
-NAME = "mjwrap.muscles"
+NAME = "mjwrap.muscles.laws"
 MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"  # its configuration
 WRENCH, TRANSMISSION = "wrench", "transmission"  # modes
 _PROBE = "mjwrap.probe"

@@ -9,7 +9,7 @@ import pyarrow as pa
 from mjwrap.errors import RecordingError
 from mjwrap.paths import Status
 from mjwrap.recording import columns
-from mjwrap.recording.layout import First, blueprint
+from mjwrap.recording.blueprint import First, blueprint
 from mjwrap.recording.scene import Scene
 from mjwrap.recording.stream import Stream
 from mjwrap.system.history import Room

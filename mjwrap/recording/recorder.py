@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjwrap.errors import RecordingError
-from mjwrap.output import PartFile, RunLog, require
+from mjwrap.files.atomic import PartFile, RunLog, require
 
 if TYPE_CHECKING:
     from mjwrap.recording.frames import Buffers

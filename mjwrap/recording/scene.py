@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from mjwrap.recording.geometry import draws, geom_shape, pose, surface_shape
 from mjwrap.recording.groups import Group, crossed_coordinates, given_groups, moved_groups
+from mjwrap.recording.static_shapes import draws, geom_shape, pose, surface_shape
 from mjwrap.recording.stream import Stream
 
 MEASURED = ("length", "velocity", "tension", "activation", "status", "iterations")  # of every muscle

@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from mjwrap.errors import RecordingError
-from mjwrap.output import PartFile
+from mjwrap.files.atomic import PartFile
 from mjwrap.recording.target import FilePipe
 
 if TYPE_CHECKING:

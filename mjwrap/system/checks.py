@@ -6,9 +6,10 @@ import mujoco
 import numpy as np
 
 from mjwrap.errors import StateError
-from mjwrap.kernels import readiness, shape
+from mjwrap.kernels.coupling import finite_checks
+from mjwrap.kernels.geometry import projection
 from mjwrap.mjcf import MuscleDeclaration, name_of
-from mjwrap.plan import kernel_rows
+from mjwrap.model.arrays import kernel_rows
 
 _BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
 _BADQVEL = int(mujoco.mjtWarning.mjWARN_BADQVEL)
@@ -32,7 +33,7 @@ def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDecla
                 local = poses.geom_xmat[node.geom].reshape(3, 3).T @ (
                     poses.site_xpos[site] - poses.geom_xpos[node.geom]
                 )
-                if shape.height(np.array(kernel_rows(node)), 0, *local.tolist()) < 0.0:
+                if projection.height(np.array(kernel_rows(node)), 0, *local.tolist()) < 0.0:
                     inner = name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
                     outer = name_of(model, mujoco.mjtObj.mjOBJ_GEOM, node.geom)
                     found.append(f"site '{inner}' is inside geom '{outer}'")
@@ -49,7 +50,7 @@ def check_state(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         ("mocap_pos", data.mocap_pos.ravel()),
         ("mocap_quat", data.mocap_quat.ravel()),
     ):
-        bad = readiness.first_bad(values)
+        bad = finite_checks.first_bad(values)
         if bad >= 0:
             raise StateError(f"{what}[{bad}]{_owner(model, what, bad)} is not finite at time {data.time:g} s")
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError, PathError, StateError
-from mjwrap.kernels import coupling, derivatives, jacobian_rate
+from mjwrap.kernels.coupling import jacobian_rate, muscle_paths
+from mjwrap.kernels.solved import hessian
 from mjwrap.mjcf import name_of
 from mjwrap.paths.derivatives import FAULTS
 from mjwrap.system.state import State
@@ -33,9 +34,9 @@ def length_jacobian_rate(muscles: MuscleSystem, state: State, direction: ArrayLi
             raise StateError(f"direction must be finite and have shape ({model.nv},), not {given.shape}")
         scratch.qvel[:] = given
         mujoco.mj_comVel(model, scratch)
-    longest = max((int(r[coupling.R_HI] - r[coupling.R_LO]) for r in plan.routes), default=0) + 2
+    longest = max((int(r[muscle_paths.R_HI] - r[muscle_paths.R_LO]) for r in plan.routes), default=0) + 2
     work = (np.empty((longest, 6)), np.empty((longest, 6)), np.empty((longest, 6)))
-    stop = np.empty((longest, derivatives.STOP))
+    stop = np.empty((longest, hessian.STOP))
     jacobian = np.zeros((plan.n, model.nv))
     kinematics = (
         *muscles._dofs, muscles._parent, *_joints(model), muscles._root,
@@ -45,9 +46,9 @@ def length_jacobian_rate(muscles: MuscleSystem, state: State, direction: ArrayLi
         plan.routes, plan.weights, plan.links, scratch.site_xpos, state.node, kinematics,
         *work, np.arange(longest), stop, jacobian,
     )  # fmt: skip
-    if fault != derivatives.SOUND:
+    if fault != hessian.SOUND:
         row = plan.routes[route]
-        name = muscles.names[int(row[coupling.R_MUSCLE])]
+        name = muscles.names[int(row[muscle_paths.R_MUSCLE])]
         where = _slot(model, plan.links, row, slot)
         raise GeometryError(f"muscle '{name}': dl/dq has no rate here: {FAULTS[fault].format(where)}")
     return jacobian
@@ -64,11 +65,11 @@ def _joints(model: mujoco.MjModel) -> tuple[NDArray[np.int64], NDArray[np.bool_]
 
 def _slot(model: mujoco.MjModel, links: NDArray[np.int64], route: NDArray[np.int64], slot: int) -> str:
     """Return the name of the site or geom in a slot of a route."""
-    lo, hi = route[coupling.R_LO], route[coupling.R_HI]
+    lo, hi = route[muscle_paths.R_LO], route[muscle_paths.R_HI]
     if slot in (0, hi - lo + 1):
-        site, geom = route[coupling.R_FROM if slot == 0 else coupling.R_TO], -1
+        site, geom = route[muscle_paths.R_FROM if slot == 0 else muscle_paths.R_TO], -1
     else:
-        site, geom = links[lo + slot - 1, coupling.L_SITE], links[lo + slot - 1, coupling.L_GEOM]
+        site, geom = links[lo + slot - 1, muscle_paths.L_SITE], links[lo + slot - 1, muscle_paths.L_GEOM]
     if geom >= 0:
         return f"geom '{name_of(model, mujoco.mjtObj.mjOBJ_GEOM, int(geom))}'"
     return f"site '{name_of(model, mujoco.mjtObj.mjOBJ_SITE, int(site))}'"

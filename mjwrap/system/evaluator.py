@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
-from mjwrap.kernels import evaluation, readiness
+from mjwrap.kernels.coupling import evaluation, finite_checks
 from mjwrap.mjcf import has_plugin, read_declarations
+from mjwrap.model.arrays import build_plan
+from mjwrap.model.takeover import Takeover
 from mjwrap.paths import Status
-from mjwrap.plan import build_plan
 from mjwrap.system.checks import check_state, ends_inside
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
-from mjwrap.takeover import Takeover
 
 _DISABLE_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 TOLERANCE = 1e-10  # largest tangency error of a path
@@ -79,12 +79,12 @@ class Evaluator(Results):
 
     def _check(self, data: mujoco.MjData) -> None:
         """Raise `StateError` naming what is not finite."""
-        if readiness.all_finite(
+        if finite_checks.all_finite(
             data.qpos, data.qvel, data.act, data.ctrl, data.mocap_pos, data.mocap_quat, self._excitation
         ):
             return
         check_state(self.model, data)
-        bad = readiness.first_bad(self._excitation)
+        bad = finite_checks.first_bad(self._excitation)
         raise StateError(f"excitation of muscle '{self.names[bad]}' is not finite at time {data.time:g} s")
 
     def _evaluate(

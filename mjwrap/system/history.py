@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels import coupling, footage
+from mjwrap.kernels.coupling import muscle_paths, recorded_frames
 from mjwrap.system.state import NUMBERS
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class History:
         self._positions = np.zeros((rows, model.nbody, 3), dtype=np.float32)
         self._quaternions = np.zeros((rows, model.nbody, 4), dtype=np.float32)
         self._points, self._contacts, self._forces = (
-            Store(rows, routes, 3), Store(rows, n, 3), Store(rows, n, footage.FORCE)
+            Store(rows, routes, 3), Store(rows, n, 3), Store(rows, n, recorded_frames.FORCE)
         )  # fmt: skip
         self._plan = plan.routes, plan.weights, plan.links
         self._tree = results._last_dof, results._dofs[2], results._root
@@ -92,7 +92,7 @@ class History:
         """Keep the last evaluation's numbers as a row."""
         last = self._results._evaluation()
         kept = self._numbers, self._status, self._iterations
-        footage.put_state(row, last.numbers, last.status, last.info, *kept)
+        recorded_frames.put_state(row, last.numbers, last.status, last.info, *kept)
 
     def put_frame(self, frame: int, poses: mujoco.MjData, spacing: float | None) -> None:
         """Keep the last evaluation's paths and forces; poses: the data whose poses it saw (`Results.poses`).
@@ -101,7 +101,7 @@ class History:
         """
         last = self._results._evaluation()
         points, contacts, forces = self._points, self._contacts, self._forces
-        while not footage.put_frame(
+        while not recorded_frames.put_frame(
             *self._plan, last.node, last.segments, last.count, last.info, last.tension, spacing or 0.0, *self._tree,
             poses.cdof, poses.subtree_com, poses.xpos, poses.xquat, *self._pairs, self._jacobian, frame,
             points.rows, points.starts, contacts.rows, contacts.starts, forces.rows, forces.starts, self._arms,
@@ -116,7 +116,7 @@ class History:
         found["status"] = self._status[:rows].astype(np.float64)
         if self._results.n:
             first = np.searchsorted(
-                self._results._plan.routes[:, coupling.R_MUSCLE], np.arange(self._results.n)
+                self._results._plan.routes[:, muscle_paths.R_MUSCLE], np.arange(self._results.n)
             )
             found["iterations"] = np.add.reduceat(self._iterations[:rows], first, axis=1)
         else:
@@ -137,18 +137,18 @@ class History:
         out, counts = self._room(room, "points", store, frames)
         sizes = np.empty(len(routes) * frames, dtype=np.int64)
         first = np.searchsorted(
-            routes[:, coupling.R_MUSCLE], np.arange(len(counts) + 1)
+            routes[:, muscle_paths.R_MUSCLE], np.arange(len(counts) + 1)
         )  # route of each muscle
         starts = store.starts[:frames].take(first, axis=1)
-        footage.gather(store.rows, starts, self._where, out, counts)
-        count = footage.list_strips(store.starts, routes, sizes, counts)
+        recorded_frames.gather(store.rows, starts, self._where, out, counts)
+        count = recorded_frames.list_strips(store.starts, routes, sizes, counts)
         return out, sizes[:count], counts
 
     def contacts(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints]:
         """Return the contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
         store = self._contacts
         out, counts = self._room(room, "contacts", store, frames)
-        footage.gather(store.rows, store.starts, self._where, out, counts)
+        recorded_frames.gather(store.rows, store.starts, self._where, out, counts)
         return out, counts
 
     def arrows(self, frames: int, scale: float, room: Room | None = None) -> tuple[Singles, Singles, Ints]:
@@ -160,7 +160,9 @@ class History:
         store = self._forces
         tails, counts = self._room(room, "tails", store, frames)
         vectors, _ = self._room(room, "vectors", store, frames)
-        footage.gather_arrows(store.rows, store.starts, self._where, float(scale), tails, vectors, counts)
+        recorded_frames.gather_arrows(
+            store.rows, store.starts, self._where, float(scale), tails, vectors, counts
+        )
         return tails, vectors, counts
 
     def _room(self, room: Room | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:

@@ -12,10 +12,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjwrap.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.errors import StateError
-from mjwrap.kernels import dynamics, layout, moments, wrenches
-from mjwrap.kernels.muscle import PATH_ACTUATOR
+from mjwrap.kernels import layout
+from mjwrap.kernels.coupling import moments, wrenches
+from mjwrap.kernels.musculotendon import dynamics
+from mjwrap.kernels.musculotendon.tension import PATH_ACTUATOR
+from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
 from mjwrap.system.derivatives import length_jacobian_rate

@@ -7,10 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import coupling, drawing, foot, layout, segments
+from mjwrap.kernels import layout
+from mjwrap.kernels.coupling import drawn_paths, muscle_paths
+from mjwrap.kernels.solved import segments
+from mjwrap.kernels.spans import end_inside
 from mjwrap.mjcf import Declarations, MuscleDeclaration
+from mjwrap.model.arrays import Plan, last_dofs
 from mjwrap.paths import Status
-from mjwrap.plan import Plan, last_dofs
 from mjwrap.system.history import History
 from mjwrap.system.state import Evaluation
 
@@ -87,20 +90,22 @@ class Results:
         False where it has a path, and where an end lies inside a surface but the length goes on from the surface.
         """
         status, error = self._evaluation().status, self.tangency_error
-        return (status != Status.CONVERGED) & ((status != Status.ENDPOINT_INSIDE) | (error >= foot.NOWHERE))
+        return (status != Status.CONVERGED) & (
+            (status != Status.ENDPOINT_INSIDE) | (error >= end_inside.NOWHERE)
+        )
 
     @property
     def iterations(self) -> NDArray[np.int64]:
         """Iterations (n,) that the search for the paths took, those of all routes of a muscle together."""
         counts = self._evaluation().info[:, layout.I_ITERATIONS]
-        return np.bincount(self._plan.routes[:, coupling.R_MUSCLE], counts, self.n).astype(np.int64)
+        return np.bincount(self._plan.routes[:, muscle_paths.R_MUSCLE], counts, self.n).astype(np.int64)
 
     @property
     def tangency_error(self) -> Array:
         """Tangency errors (n,): the largest of each muscle's routes, 0 where it touches no surface."""
         found = np.zeros(self.n)
         errors = self._evaluation().info[:, layout.I_ERROR]
-        np.maximum.at(found, self._plan.routes[:, coupling.R_MUSCLE], errors)
+        np.maximum.at(found, self._plan.routes[:, muscle_paths.R_MUSCLE], errors)
         return found
 
     @property
@@ -148,16 +153,16 @@ class Results:
         state, step = self._evaluation(), 0.0 if spacing is None else float(spacing)
         starts = np.zeros(self.n + 1, dtype=np.int64)
         given = (self._plan.routes, state.node, state.segments, state.count, state.info, step, only)
-        out = np.empty((drawing.polylines(*given, np.empty((0, 3)), starts), 3))
-        drawing.polylines(*given, out, starts)
+        out = np.empty((drawn_paths.polylines(*given, np.empty((0, 3)), starts), 3))
+        drawn_paths.polylines(*given, out, starts)
         return out, starts
 
     def _contacts(self, only: int) -> tuple[Array, NDArray[np.int64]]:
         state = self._evaluation()
         starts = np.zeros(self.n + 1, dtype=np.int64)
         given = (self._plan.routes, state.node, state.segments, state.count, only)
-        out = np.empty((drawing.contacts(*given, np.empty((0, 3)), starts), 3))
-        drawing.contacts(*given, out, starts)
+        out = np.empty((drawn_paths.contacts(*given, np.empty((0, 3)), starts), 3))
+        drawn_paths.contacts(*given, out, starts)
         return out, starts
 
     def points(self, i: int, spacing: float | None = None) -> Array:
@@ -198,12 +203,12 @@ class Results:
         """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""
         state, plan = self._evaluation(), self._plan
         found = []
-        for c in np.flatnonzero(plan.routes[:, coupling.R_MUSCLE] == self._known(i)):
+        for c in np.flatnonzero(plan.routes[:, muscle_paths.R_MUSCLE] == self._known(i)):
             pull = state.tension[i] * plan.weights[c]
-            first = int(plan.routes[c, coupling.R_LO]) + int(c)
+            first = int(plan.routes[c, muscle_paths.R_LO]) + int(c)
             for row in state.segments[first : first + int(state.count[c])]:
                 force = pull * row[segments.G_E : segments.G_E + 3]
                 for column, sign, index in ((segments.G_A, 1.0, row[0]), (segments.G_B, -1.0, row[1])):
-                    body = int(coupling.end_body(plan.routes, plan.links, c, int(index)))
+                    body = int(muscle_paths.end_body(plan.routes, plan.links, c, int(index)))
                     found.append((body, row[column : column + 3].copy(), sign * force))
         return found

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels import layout, segments
-from mjwrap.plan import Plan
+from mjwrap.kernels import layout
+from mjwrap.kernels.solved import segments
+from mjwrap.model.arrays import Plan
 
 NUMBERS = (
     "activation",

@@ -9,7 +9,7 @@ import os
 import mujoco
 
 from mjwrap.errors import RecordingError
-from mjwrap.output import PartFile, RunLog, require
+from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.video.camera import find_camera, look_at_muscles
 from mjwrap.video.formats import FORMATS, Writer
 from mjwrap.video.offscreen import Offscreen

@@ -14,9 +14,9 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels import segments as sg
-from mjwrap.kernels.coupling import R_MUSCLE, ROUTE
-from mjwrap.kernels.drawing import route_contacts, route_points
+from mjwrap.kernels.coupling.drawn_paths import route_contacts, route_points
+from mjwrap.kernels.coupling.muscle_paths import R_MUSCLE, ROUTE
+from mjwrap.kernels.solved import segments as sg
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import (

@@ -8,13 +8,13 @@ muscles' arrays were made from, in lists of regions (offset of the pointer in mj
 - derived: doubles that mean something else there: then Python builds the arrays anew;
 - structure: bytes of ids and kinds, looked at only when another model comes, as in `rollout` over a list of models.
 
-`mjwrap/plugin/watch.py` makes the lists.
+`mjwrap/plugin/blocks/watch.py` makes the lists.
 """
 
 from __future__ import annotations
 
-from mjwrap.kernels import mujoco_muscle as law
-from mjwrap.kernels.muscle import PARAMS
+from mjwrap.kernels.musculotendon import mujoco_muscle as law
+from mjwrap.kernels.musculotendon.tension import PARAMS
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import call, octets, reals, store_word, word, words

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from numba.core import types
 
-from mjwrap.kernels.evaluation import evaluate
+from mjwrap.kernels.coupling.evaluation import evaluate
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st

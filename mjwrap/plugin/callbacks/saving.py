@@ -9,9 +9,9 @@ state made by hand is as good as one that MuJoCo has reset.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels import segments as sg
-from mjwrap.kernels.coupling import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE
-from mjwrap.kernels.foot import has_length
+from mjwrap.kernels.coupling.muscle_paths import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE
+from mjwrap.kernels.solved import segments as sg
+from mjwrap.kernels.spans.end_inside import has_length
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import reals, word, words

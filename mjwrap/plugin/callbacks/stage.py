@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels import segments as sg
-from mjwrap.kernels.coupling import ROUTE
-from mjwrap.kernels.dynamics import TIMES, write_states
-from mjwrap.kernels.evaluation import evaluate
-from mjwrap.kernels.muscle import PARAMS
-from mjwrap.kernels.wrenches import body_wrenches, put, take_back
+from mjwrap.kernels.coupling.evaluation import evaluate
+from mjwrap.kernels.coupling.muscle_paths import ROUTE
+from mjwrap.kernels.coupling.wrenches import body_wrenches, put, take_back
+from mjwrap.kernels.musculotendon.dynamics import TIMES, write_states
+from mjwrap.kernels.musculotendon.tension import PARAMS
+from mjwrap.kernels.solved import segments as sg
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.follow import follow

@@ -3,12 +3,12 @@
 MuJoCo computes these three in its position and velocity stages, then passive forces, at which the plugin is called, and
 only then the forces of actuators: so what is written in between is what gain, bias, clamps, sensors of velocity and
 force, and the derivatives of the implicit integrators see. What it needs beside the block of the instance lies in a
-part of that block with a head of its own, which `mjwrap/plugin/transmission.py` writes.
+part of that block with a head of its own, which `mjwrap/plugin/blocks/transmission_part.py` writes.
 """
 
 from __future__ import annotations
 
-from mjwrap.kernels.moments import write_transmissions
+from mjwrap.kernels.coupling.moments import write_transmissions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import half, halves, reals, word, words

@@ -1,0 +1,104 @@
+"""All checks of a model: random poses from a cold start, sweeps of every joint, a short motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.checking.differences import Neighbourhood, extrapolated_error, orders
+from mjwrap.checking.energy import check_energy
+from mjwrap.checking.forces import balance_check, look_at_forces, power_check, work_check
+from mjwrap.checking.outcome import Check, Checks
+from mjwrap.checking.sweeps import Paths, Sweeper
+from mjwrap.errors import ModelError
+from mjwrap.mjcf import dof_names
+from mjwrap.poses.joint_sweeps import PoseMaker
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], object]
+
+
+def check_model(
+    model: mujoco.MjModel,
+    *,
+    poses: int = 20,
+    samples: int = 101,
+    base: Array | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Checks:
+    """Check on a model that paths are tangent, that their derivatives and forces fit, and that nothing jumps.
+
+    poses: random ones; samples: of each joint's sweep around the base pose (nq,), qpos0 if None, and around the middle
+    of all ranges, on which joints that are coupled to it follow; progress: called with (name, done, all). `ModelError`
+    where the model has no muscles. Limits are those of the project's design: what holds on every model.
+    """
+    muscles, data = MuscleSystem(model), mujoco.MjData(model)
+    if not muscles.n:
+        raise ModelError("the model has no muscles along geodesic paths: nothing to check")
+    start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
+    maker = PoseMaker(model, start, seed)
+    paths = Paths()
+    speed = Check("velocity", "dl/dt is the derivative of l", 1e-8, "of its size")
+    arms = Check("moment_arm", "dl/dq is the derivative of l", 1e-8, "of its size")
+    forces = work_check(), balance_check(), power_check()
+    jumps = Check("jumps", "no jump of length or moment arm along a sweep", 0.0, "jumps")
+    makers, middle = [maker], maker.middle()
+    if len(maker.joints()) > 1 and not np.array_equal(middle, start):
+        makers.append(PoseMaker(model, middle, seed, 1))
+    free = [joint for joint in maker.joints() if not maker.follows(joint)]
+    sweeps = [(each, joint, axis) for each in makers for joint in free for axis in each.axes(joint)]
+    total = poses + len(sweeps) + 1
+    tell = progress or (lambda name, done, all: None)
+
+    rng = np.random.default_rng(seed)
+    measured: list[Array] = []
+    motion = maker.random(poses)
+    for k in range(poses):
+        tell("random poses", k, total)
+        where = f"random pose {k}"
+        data.qpos[:], data.qvel[:] = motion.qpos[k], motion.qvel[k]
+        data.act[:], data.ctrl[:] = rng.uniform(0.1, 1.0, model.na), rng.uniform(0.1, 1.0, len(data.ctrl))
+        muscles.excitation = rng.uniform(0.1, 1.0, muscles.n)
+        muscles.reset(data)
+        measured.append(_derivatives(muscles, data, where, speed, arms, paths))
+        look_at_forces(muscles, data, where, forces)
+    found = np.concatenate([np.empty(0), *measured])
+    if found.size:
+        arms.remarks.append(f"differences come to it at order {np.median(found):.2f} (second order is 2)")
+    data.qvel[:] = 0.0
+    sweeper = Sweeper(muscles, data, paths, jumps)
+    for k, (each, joint, axis) in enumerate(sweeps):
+        tell("sweeps", poses + k, total)
+        sweeper.sweep(each, joint, axis, samples)
+    tell("energy", total - 1, total)
+    energy = check_energy(model, maker.base)
+    coupled = len(maker.joints()) - len(free)
+    facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples,
+             "joints_that_follow": coupled}  # fmt: skip
+    return Checks([*paths.finish(), speed, arms, *forces, jumps, energy], facts)
+
+
+def _derivatives(
+    muscles: MuscleSystem, data: mujoco.MjData, where: str, speed: Check, arms: Check, paths: Paths
+) -> Array:
+    """Compare l̇ and ∂l/∂q at a pose with differences of l; return the orders at which these come to ∂l/∂q."""
+    model = muscles.model
+    jacobian = muscles.length_jacobian(data)
+    paths.look(muscles, where)
+    velocity, length = muscles.velocity, muscles.length
+    around = Neighbourhood(muscles, data)
+    size = np.maximum(np.abs(jacobian).max(axis=1, initial=0.0), 1e-3 * length)
+    full = np.maximum(np.abs(jacobian) @ np.abs(data.qvel), 1e-3 * length)
+    speed.see(extrapolated_error(around.central(data.qvel.copy()), velocity) / full, where, muscles.names)
+    found = []
+    for d, dof in enumerate(dof_names(model)):
+        central = around.central(np.eye(model.nv)[d])
+        error = extrapolated_error(central, jacobian[:, d]) / size
+        arms.see(error, f"{dof}, {where}", muscles.names)
+        found.append(orders(central, jacobian[:, d], size))
+    return np.concatenate([np.empty(0), *found])

@@ -1,0 +1,59 @@
+"""While a command works: progress bars, and what has to be there before it begins."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from typing import Any
+
+from mjwrap.cli.common.errors import UserError
+
+
+def progress_bar(total: float, unit: str, label: str) -> Any:
+    """Return a bar with `update(n)` and `close()` that shows after two seconds, on a terminal only."""
+    if sys.stderr.isatty():
+        with contextlib.suppress(ImportError):
+            from tqdm import tqdm
+
+            form = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} {unit} [{elapsed}<{remaining}]"
+            return tqdm(total=total, unit=unit, desc=label, delay=2.0, leave=False, bar_format=form)
+    return _NoBar()
+
+
+class Stages:
+    """A bar for work that names its parts: called before each with (name, how many are done, of how many)."""
+
+    def __init__(self, unit: str, label: str) -> None:
+        self._unit, self._label = unit, label
+        self._bar: Any = None
+
+    def __call__(self, name: str, done: int, count: int) -> None:
+        if self._bar is None:
+            self._bar = progress_bar(count, self._unit, self._label)
+        self._bar.set_description_str(name, refresh=False)
+        self._bar.update(int(done > 0))
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+class _NoBar:
+    def update(self, n: float) -> None:
+        """Do nothing."""
+
+    def set_description_str(self, text: str, refresh: bool = True) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def need_matplotlib() -> None:
+    """Raise `UserError` before a run whose plot could not be drawn."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise UserError("--plot needs matplotlib: pip install 'mjwrap[demo]'") from None
+    matplotlib.use("Agg")

@@ -1,0 +1,85 @@
+"""Ctrl-C, kill and a closed terminal: what asks a command to end, and what it then says and returns."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import stat
+import sys
+from collections.abc import Iterator
+from typing import Any, NoReturn
+
+from mjwrap.files.atomic import STOPPING
+
+
+class Stopped(KeyboardInterrupt):
+    """A command was asked to end; `number` is the signal's, `name` what a person calls it."""
+
+    def __init__(self, number: int = signal.SIGINT) -> None:
+        super().__init__()
+        self.name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
+        self.code = 128 + number  # the exit code, as shells have it
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[None]:
+    """Raise `Stopped` where one of the signals comes inside a with block; those that are ignored stay so (nohup)."""
+    with _handled(_stop):
+        yield
+
+
+class Interrupt:
+    """A signal asks a loop to end: look at `asked`, a `Stopped` then, once a turn. A second one stops at once."""
+
+    def __init__(self) -> None:
+        self.asked: Stopped | None = None
+        self._held = contextlib.ExitStack()
+
+    def __enter__(self) -> Interrupt:
+        self._held.enter_context(_handled(self._handle))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._held.close()
+
+    def _handle(self, number: int, frame: object) -> None:
+        if self.asked:
+            _stop(number, frame)
+        _terminal_is_gone(number)
+        self.asked = Stopped(number)
+
+
+@contextlib.contextmanager
+def _handled(handler: Any) -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in STOPPING}
+    taken = [number for number, was in before.items() if was is not signal.SIG_IGN]
+    try:
+        for number in taken:
+            signal.signal(number, handler)
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, before[number])
+
+
+def _stop(number: int, _: object) -> NoReturn:
+    _terminal_is_gone(number)
+    raise Stopped(number)
+
+
+def _terminal_is_gone(number: int) -> None:
+    """Where the terminal was closed, say what is said to nobody: writing to it would be an error."""
+    if signal.Signals(number).name != "SIGHUP":
+        return
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):  # not a file, or closed
+            if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
+                silence(stream.fileno())
+
+
+def silence(number: int) -> None:
+    """Let what is written to a file descriptor go nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, number)
+    os.close(nowhere)

@@ -1,0 +1,1 @@
+"""`mjwrap compare`: MuJoCo's tendons beside mjwrap's paths."""

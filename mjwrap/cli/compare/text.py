@@ -1,0 +1,194 @@
+"""A comparison as text and as values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import mjwrap
+from mjwrap.comparison import (
+    AGREE,
+    Jump,
+    MotionDifference,
+    MuscleSummary,
+    Outcome,
+    PoseComparison,
+    TableDifference,
+    Verdict,
+)
+from mjwrap.comparison.verdict import Extreme
+from mjwrap.text import counted
+
+TITLES = {
+    Outcome.AGREE: "equal",
+    Outcome.OTHER_BRANCH: "other way round",
+    Outcome.MUJOCO_NOT_GEODESIC: "MuJoCo no geodesic",
+    Outcome.NO_PATH: "no path exists",
+    Outcome.MJWRAP_FAILED: "mjwrap failed",
+    Outcome.MJWRAP_WRONG: "mjwrap wrong",
+    Outcome.UNEXPLAINED: "unexplained",
+    Outcome.WRONG_SIDE: "wrong side",
+}
+Say = Callable[[str], object]
+
+
+def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) -> None:
+    """Say counts and the largest differences of every muscle, then the verdicts and the jumps."""
+    both = [s for s in found.muscles.values() if not s.native_only]
+    if both:
+        _tell_table(say, found, both)
+    say("\nwhich is right, and why")
+    equal = [s for s in both if s.counts[Outcome.AGREE.name] == s.poses and verdicts[s.name].right == "both"]
+    if equal:
+        length, velocity, arm = np.max([s.agreement for s in equal], axis=0)
+        told = f"to {length:.0e} m, {velocity:.0e} m/s, {arm:.0e} m/rad"
+        say(f"  both, equal at every pose {told}: {', '.join(s.name for s in equal)}")
+    for name, (right, why) in verdicts.items():
+        if found.muscles[name] not in equal:
+            say(f"  {name}: {right}: {why}" if right != "-" else f"  {name}: {why}")
+    for name, why in found.left_out.items():
+        say(f"  {name}: not compared: {why}")
+    far = [s for s in both if s.length.difference > AGREE]
+    if far:
+        say("\nwhere lengths differ most")
+        for s in sorted(far, key=lambda s: -s.length.difference)[:10]:
+            say(
+                f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {where(s.length)}"
+            )
+    if found.jumps:
+        _tell_jumps(say, found.jumps)
+
+
+def _tell_table(say: Say, found: PoseComparison, both: list[MuscleSummary]) -> None:
+    shown = [o for o in Outcome if o == Outcome.AGREE or found.total(o)]
+    wide = max(6, *(len(s.name) for s in both))
+    heads = [TITLES[o] for o in shown]
+    columns = "".join(f"  {head:>{max(len(head), 6)}}" for head in heads)
+    say(
+        f"{'muscle':{wide}}  {'poses':>6}{columns}   largest difference: length [m]  velocity [m/s]  arm [m/rad]"
+    )
+    for s in both:
+        counts = "".join(f"  {s.counts[o.name]:>{max(len(h), 6)}}" for o, h in zip(shown, heads, strict=True))
+        gaps = s.length.difference, s.velocity.difference, s.moment_arm.difference
+        say(f"{s.name:{wide}}  {s.poses:>6}{counts}   {gaps[0]:>31.1e}{gaps[1]:>16.1e}{gaps[2]:>13.1e}")
+
+
+def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
+    """Say the largest jump of each program, muscle and joint."""
+    largest: dict[tuple[str, str, str], Jump] = {}
+    for jump in jumps:
+        key = jump.program, jump.muscle, jump.sweep
+        if key not in largest or abs(jump.length) > abs(largest[key].length):
+            largest[key] = jump
+    say(f"\njumps along the sweeps: {len(jumps)}{starred(jumps)}; the largest of each muscle and joint")
+    for jump in sorted(largest.values(), key=lambda j: (j.program, j.muscle, j.sweep)):
+        say(
+            f"  {jump.program} {jump.muscle} at {jump.where}: {millimetres(jump.length)} mm, "
+            f"moment arm {millimetres(-jump.slope)} mm; {jump.before} -> {jump.after}"
+        )
+
+
+def starred(jumps: Sequence[Jump]) -> str:
+    """Say how many of some jumps are at joints that were moved without those that they are coupled to."""
+    alone = sum(jump.alone for jump in jumps)
+    return f", {alone} of them (*) at joints that follow others and were moved alone" if alone else ""
+
+
+def millimetres(metres: float, digits: int = 3) -> str:
+    """Return a difference in mm with its sign; 0 for what the digits cannot show."""
+    text = f"{1e3 * metres:+.{digits}f}"
+    return text if float(text) else "0"
+
+
+def where(extreme: Extreme) -> str:
+    """Say where a largest difference was seen."""
+    if extreme.motion in extreme.joints:
+        return f"{extreme.motion} = {extreme.at:.6f}"
+    told = ", ".join(f"{name} = {value:.4f}" for name, value in list(extreme.joints.items())[:6])
+    return f"{extreme.motion} {extreme.at:g} ({told}{', ...' if len(extreme.joints) > 6 else ''})"
+
+
+def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
+    """Say how far both programs are from another program's tables, the worst first."""
+    if not tables:
+        return
+    wide = max(6, *(len(d.muscle) for d in tables))
+    say("\nbeside the given tables: program minus table, in mm; spread: rms without the mean")
+    say(
+        f"{'muscle':{wide}}  program  quantity                     rows      mean    spread   largest  at [s]"
+    )
+    for d in sorted(tables, key=lambda d: -d.spread):
+        what = f"moment arm, {d.about}" if d.about else "length"
+        numbers = "".join(f"{millimetres(x, 4):>10}" for x in (d.mean, d.spread, d.largest))
+        say(f"{d.muscle:{wide}}  {d.program:7s}  {what:25s}  {d.rows:6d}{numbers}  {d.time:g}")
+
+
+def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: list[str]) -> None:
+    """Say how far the two runs drift apart."""
+    say(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
+    if changed:
+        those = counted(len(changed), "muscle")
+        say(f"  {those} of another law by MuJoCo's curves in both (--law declared: by their own)")
+    dof, gap, when = motion.worst()
+    last, final = motion.final()
+    say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")
+    if motion.stopped:
+        say(f"  ended early: {motion.stopped}")
+    if motion.paths:
+        say("  mjwrap's run had no path (and held the last good force) for")
+        say("\n".join(f"    {line}" for line in motion.paths.splitlines()))
+
+
+def as_values(
+    found: PoseComparison, verdicts: dict[str, Verdict], motion: MotionDifference | None
+) -> dict[str, Any]:
+    """Return everything as values."""
+    content: dict[str, Any] = {
+        "mujoco": mujoco.__version__,
+        "mjwrap": mjwrap.__version__,
+        "poses": found.poses,
+        "totals": {o.name.lower(): found.total(o) for o in Outcome},
+        "muscles": {name: _muscle(s, verdicts[name]) for name, s in found.muscles.items()},
+        "jumps": [_jump(jump) for jump in found.jumps],
+        "left_out": found.left_out,
+    }
+    if motion is not None:
+        dof, gap, when = motion.worst()
+        last, final = motion.final()
+        content["motion"] = {
+            "duration": float(motion.time[-1]),
+            "largest": {"joint": dof, "difference": gap, "time": when},
+            "final": {"joint": last, "difference": final},
+            "each": dict(zip(motion.dofs, np.abs(motion.difference).max(axis=0).tolist(), strict=True)),
+            "stopped": motion.stopped,
+            "paths_not_found": motion.paths,
+        }
+    return content
+
+
+def _muscle(s: MuscleSummary, verdict: Verdict) -> dict[str, Any]:
+    return {
+        "right": verdict.right,
+        "why": verdict.why,
+        "poses": s.poses,
+        "counts": {o.name.lower(): s.counts[o.name] for o in Outcome},
+        "mujoco_faults": [
+            {"fault": fault.name.lower(), "geom": geom, "poses": n, "largest": s.measures[fault, geom]}
+            for (fault, geom), n in s.faults.most_common()
+        ],
+        "agreement": dict(zip(("length", "velocity", "moment_arm"), s.agreement.tolist(), strict=True)),
+        "length": vars(s.length),
+        "velocity": vars(s.velocity),
+        "moment_arm": vars(s.moment_arm),
+        "mjwrap_at_fault": [
+            {"outcome": outcome.lower(), "motion": motion, "at": at, "joints": joints}
+            for outcome, motion, at, joints in s.bad_poses
+        ],
+    }
+
+
+def _jump(jump: Jump) -> dict[str, Any]:
+    return vars(jump)

@@ -1,0 +1,1 @@
+"""`mjwrap inspect`: what a model declares."""

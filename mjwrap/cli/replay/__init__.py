@@ -1,0 +1,1 @@
+"""`mjwrap replay`: look at recordings and states."""

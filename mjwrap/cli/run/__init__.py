@@ -1,0 +1,1 @@
+"""`mjwrap run`: simulate a model."""

@@ -1,0 +1,126 @@
+"""The picture of a run: joints, activations, lengths and tensions over time; few muscles as lines, many as maps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib.pyplot as plt
+import mujoco
+import numpy as np
+from matplotlib.colors import Normalize, PowerNorm
+from numpy.typing import NDArray
+
+from mjwrap import MuscleSystem
+from mjwrap.cli.run.history import History
+from mjwrap.files.atomic import PartFile
+from mjwrap.mjcf import name_of
+from mjwrap.text import counted
+
+Array = NDArray[np.float64]
+LINES = 12  # more curves than this in one panel cannot be told apart
+_STYLES = ("-", "--", ":")
+
+
+def plot_run(
+    output: PartFile, title: str, model: mujoco.MjModel, muscles: MuscleSystem, history: History
+) -> None:
+    """Draw a run and give the file its name."""
+    many = muscles.n > LINES
+    turns, slides, left_out = _joints(model, history.column(1))
+    panels = [p for p in ("turns" if turns else "", "slides" if slides else "") if p]
+    panels += ["activation", "length", "tension"] if muscles.n else []
+    tall = max(2.6, 0.155 * muscles.n) if many else 2.3
+    heights = [2.3 if p in ("turns", "slides") else tall for p in panels] or [2.3]
+    figure, axes = plt.subplots(
+        len(heights), 1, sharex=True, squeeze=False, figsize=(11.0, sum(heights) + 0.9), layout="constrained",
+        gridspec_kw={"height_ratios": heights},
+    )  # fmt: skip
+    time = history.time
+    for axis, panel in zip(axes[:, 0], panels, strict=False):
+        if panel == "turns":
+            _lines(axis, time, {name: np.degrees(x) for name, x in turns.items()}, "joints [°]", many)
+        elif panel == "slides":
+            _lines(axis, time, {name: 1e3 * x for name, x in slides.items()}, "joints [mm]", many)
+        else:
+            _muscle_panel(figure, axis, time, panel, muscles, history, many)
+    notes = [f"left out: {counted(left_out, 'joint')} that move less"] if left_out else []
+    if muscles.failures.any():
+        failed = [name for name, count in zip(muscles.names, muscles.failures, strict=True) if count]
+        notes.append(f"paths not found at some steps: {'in red' if many else ', '.join(failed)}")
+    figure.supxlabel("; ".join(notes), fontsize=8, color="0.4")
+    axes[-1, 0].set_xlabel("time [s]")
+    axes[-1, 0].set_xlim(time[0], max(time[-1], time[0] + 1e-9))
+    figure.suptitle(title, fontsize=11)
+    save(figure, output)
+
+
+def save(figure: Any, output: PartFile) -> None:
+    """Write a figure and give the file its name."""
+    with output.writing():
+        figure.savefig(output.part, dpi=110)
+    plt.close(figure)
+    output.publish()
+
+
+def _joints(model: mujoco.MjModel, qpos: Array) -> tuple[dict[str, Array], dict[str, Array], int]:
+    """Return the positions of hinges and of slides that move most, and how many are left out."""
+    turns: dict[str, Array] = {}
+    slides: dict[str, Array] = {}
+    for j in range(model.njnt):
+        name, curve = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j), qpos[:, model.jnt_qposadr[j]]
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE:
+            turns[name] = curve
+        elif model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE:
+            slides[name] = curve
+    count = len(turns) + len(slides)
+    for group in (turns, slides):
+        for name in sorted(group, key=lambda n: -float(np.ptp(group[n])))[LINES:]:
+            del group[name]
+    return turns, slides, count - len(turns) - len(slides)
+
+
+def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str, wide: bool = False) -> None:
+    """Draw named curves, with a legend at the right or, over `wide` panels, on top."""
+    colours = plt.get_cmap("tab10").colors  # pyright: ignore[reportAttributeAccessIssue]
+    for k, (name, curve) in enumerate(curves.items()):
+        axis.plot(
+            time, curve, color=colours[k % 10], linestyle=_STYLES[k // 10 % 3], linewidth=1.4, label=name
+        )
+    axis.set_ylabel(label)
+    axis.grid(alpha=0.25)
+    if wide:  # colour bars take the place at the right
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, fontsize=7.5, frameon=False)
+    else:
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+
+
+def _muscle_panel(
+    figure: Any, axis: Any, time: Array, panel: str, muscles: MuscleSystem, history: History, many: bool
+) -> None:
+    values = history.column({"activation": 2, "length": 3, "tension": 4}[panel])
+    label = {"activation": "activation", "length": "length [mm]", "tension": "tension [N]"}[panel]
+    if panel == "length":
+        values = 1e3 * values
+    if not many:
+        _lines(axis, time, {name: values[:, i] for i, name in enumerate(muscles.names)}, label)
+        if panel == "activation":
+            axis.set_ylim(-0.03, max(1.03, float(values.max()) * 1.03))
+        return
+    if panel == "length":  # each muscle against its own first length: they differ tenfold
+        values, label = values - values[0], "length, change since the start [mm]"
+    top = float(np.abs(values).max()) or 1.0
+    norm = {
+        "activation": Normalize(0.0, 1.0),
+        "length": Normalize(-top, top),
+        "tension": PowerNorm(0.5, 0.0, top),  # so that small muscles are seen beside large ones
+    }[panel]
+    colours = "RdBu_r" if panel == "length" else "viridis"
+    edges = np.append(time, time[-1] + (time[-1] - time[-2] if len(time) > 1 else 1e-3))
+    picture = axis.pcolormesh(
+        edges, np.arange(muscles.n + 1), values.T, cmap=colours, norm=norm, rasterized=True
+    )
+    axis.set_yticks(np.arange(muscles.n) + 0.5, muscles.names, fontsize=6.5)
+    for tick, failures in zip(axis.get_yticklabels(), muscles.failures, strict=True):
+        tick.set_color("red" if failures else "black")
+    axis.invert_yaxis()
+    figure.colorbar(picture, ax=axis, label=label, pad=0.01, aspect=30)

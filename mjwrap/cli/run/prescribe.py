@@ -1,0 +1,117 @@
+"""Joints that follow a given motion, whatever pulls at them; the rest of the model feels that motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.cli.common.errors import UserError
+from mjwrap.cli.common.models import find_joint, single_joints
+from mjwrap.errors import SignalError
+from mjwrap.files import SUFFIXES, read_table
+from mjwrap.runs.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
+
+Array = NDArray[np.float64]
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+HEAVY = 1e9  # inertia of a prescribed joint, in those of the heaviest one
+
+
+class Spline:
+    """A smooth curve through samples; the first and last value are held outside."""
+
+    def __init__(self, times: Array, values: Array) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self._low, self._high = float(times[0]), float(times[-1])
+        # at rest at both ends, where the value is held from
+        self._curve = CubicSpline(times, values, bc_type="clamped") if len(times) > 1 else None
+        self._only = float(values[0])
+
+    def _at(self, t: float, order: int) -> float:
+        if self._curve is None:
+            return 0.0 if order else self._only
+        if order and not self._low <= t <= self._high:
+            return 0.0
+        return float(self._curve(min(max(t, self._low), self._high), order))
+
+    def value(self, t: float) -> float:
+        """Return the number at time t."""
+        return self._at(t, 0)
+
+    def rate(self, t: float) -> float:
+        """Return the derivative at time t."""
+        return self._at(t, 1)
+
+
+class Prescribed:
+    """The prescribed joints of a run.
+
+    entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
+    column for each joint. Positions in rad or m, or in degrees where the table's header says so. The joints' armature
+    is changed in `model`.
+    """
+
+    def __init__(self, model: mujoco.MjModel, entries: Sequence[str]) -> None:
+        self._model = model
+        found: dict[int, SmoothSignal] = {}
+        for entry in entries:
+            name, equals, pattern = entry.rpartition("=")
+            equals = equals and not Path(entry).is_file()
+            if not equals and Path(entry).suffix.lower() not in SUFFIXES:
+                known = ", ".join(single_joints(model)) or "none"
+                raise UserError(
+                    f"--prescribe '{entry}': write JOINT=PATTERN, such as knee=sine:0.5,1, or name a table "
+                    f"({', '.join(SUFFIXES)}); joints: {known}"
+                )
+            if equals:
+                found[find_joint(model, name, entry)] = _smooth(name, pattern)
+            else:
+                table, joints = read_table(entry), single_joints(model)
+                for column, driven in match_columns(table, list(joints), "hinge or slide").items():
+                    joint = joints[driven]
+                    turns = table.in_degrees and int(model.jnt_type[joint]) == _HINGE
+                    values = np.radians(table[column]) if turns else table[column]
+                    found[joint] = Spline(table.time, values)
+        self.joints = list(found)
+        self._signals = list(found.values())
+        self._qpos = np.array([model.jnt_qposadr[j] for j in found], dtype=np.int64)
+        self._dofs = np.array([model.jnt_dofadr[j] for j in found], dtype=np.int64)
+        # Joints so heavy that nothing else can turn them: at every stage of the integrator they do as they are told.
+        self._inertia = HEAVY * float(np.max(model.dof_M0, initial=1e-3))
+        model.dof_armature[self._dofs] = self._inertia
+
+    def place(self, data: mujoco.MjData) -> None:
+        """Put the joints where they should be at `data.time`, with their speeds."""
+        if self.joints:
+            data.qpos[self._qpos] = [signal.value(data.time) for signal in self._signals]
+            data.qvel[self._dofs] = [signal.rate(data.time) for signal in self._signals]
+
+    def drive(self, data: mujoco.MjData) -> None:
+        """Apply the joint forces that take the joints through the coming step.
+
+        Their accelerations are the mean ones of the step: right to second order in its length.
+        """
+        if self.joints:
+            now, h = data.time, self._model.opt.timestep
+            change = np.array([signal.rate(now + h) - signal.rate(now) for signal in self._signals])
+            data.qfrc_applied[self._dofs] = self._inertia * change / h
+
+
+def _smooth(name: str, pattern: str) -> SmoothSignal:
+    signal = parse_pattern(pattern)(name, 0, 1)
+    if not isinstance(signal, Constant | Sine):
+        raise SignalError(
+            f"'{name}={pattern}': a joint can follow a constant, sine, cosine or file; it cannot jump"
+        )
+    return signal
+
+
+def check_free(joints: Sequence[int], positions: Sequence[str], model: mujoco.MjModel) -> None:
+    """Raise `UserError` where a start position is given for a joint that is prescribed."""
+    for entry in positions:
+        if find_joint(model, entry.rpartition("=")[0], entry) in joints:
+            raise UserError(f"'{entry}': this joint's position is prescribed")

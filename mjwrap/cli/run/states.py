@@ -1,0 +1,219 @@
+"""States of a model over time, from a table: positions, velocities and activations by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap import MuscleSystem, Table
+from mjwrap.cli.common.errors import UserError
+from mjwrap.cli.common.models import single_joints
+from mjwrap.cli.run.samples import MUSCLE_KINDS
+from mjwrap.mjcf import act_names, dof_names, qpos_names
+from mjwrap.runs.excitation import control_names
+from mjwrap.text import counted
+
+Array = NDArray[np.float64]
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+@dataclass(frozen=True)
+class States:
+    """States (T, ...): time [s], qpos, qvel, act, ctrl; remarks: what was not said, and what took its place.
+
+    own (T, 2n): activation and fibre length [m] of each muscle, for those whose states are not in `act`.
+    """
+
+    time: Array
+    qpos: Array
+    qvel: Array
+    act: Array
+    ctrl: Array
+    own: Array
+    remarks: tuple[str, ...]
+
+    def put(self, muscles: MuscleSystem, data: mujoco.MjData, k: int) -> None:
+        """Put state k into data, and what has no place there into the muscles."""
+        data.time = self.time[k]
+        data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = (
+            self.qpos[k],
+            self.qvel[k],
+            self.act[k],
+            self.ctrl[k],
+        )
+        without = [i for i, muscle in enumerate(muscles.declarations) if muscle.actuator < 0]
+        if without:
+            own = self.own[k].reshape(-1, 2)
+            put_own(muscles, data, {i: (own[i, 0], own[i, 1]) for i in without})
+            for i in without:
+                muscles.excitation[i] = own[i, 0]  # what a muscle without dynamics pulls with
+
+
+def put_own(muscles: MuscleSystem, data: mujoco.MjData, own: Mapping[int, tuple[float, float]]) -> None:
+    """Set activation and fibre length [m] of muscles, by number, that have no actuator to keep them in `act`."""
+    branch = muscles.branch(data)
+    rows = branch[len(branch) - 2 * muscles.n :].reshape(-1, 2)
+    for i, pair in own.items():
+        rows[i] = pair
+    muscles.set_branch(data, branch)
+
+
+def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjData, table: Table) -> States:
+    """Return the states that a table holds; what it does not name stays as at the start.
+
+    Columns: "qpos:JOINT", "qvel:JOINT", "act:ACTUATOR", "ctrl:ACTUATOR", "activation:MUSCLE", "fiber_length:MUSCLE" as
+    `mjwrap run` writes them; "qpos[3]" by number; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
+    "MUSCLE/fiber_length" as in OpenSim's files, with the path before them or without. "act" counts before what else
+    says the same. Rotations are in rad, or in degrees where the header says so. Without velocities they are the
+    differences of the positions. `UserError` where no column names a joint, and for arrays of another model's size.
+    """
+    reader = _Reader(model, muscles, start, table)
+    reader.check_widths()
+    for column in sorted(table.names, key=lambda name: name.startswith(("act:", "act["))):
+        reader.take(column)
+    if not reader.found["qpos"]:
+        known = ", ".join(qpos_names(model)) or "none"
+        raise UserError(f"'{table.source}': no column names a joint; the model has: {known}")
+    return reader.states()
+
+
+class _Reader:
+    """Sorts columns into the arrays of a state."""
+
+    def __init__(
+        self, model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjData, table: Table
+    ) -> None:
+        self.model, self.table, self.start = model, table, start
+        self.names = {
+            "qpos": qpos_names(model), "qvel": dof_names(model), "act": act_names(model), "ctrl": control_names(model),
+        }  # fmt: skip
+        self.arrays = {
+            kind: np.tile(getattr(start, kind), (len(table.time), 1)).astype(np.float64)
+            for kind in self.names
+        }
+        branch = muscles.branch(start)
+        self.arrays["own"] = np.tile(branch[len(branch) - 2 * muscles.n :], (len(table.time), 1))
+        self.found: dict[str, set[int]] = {kind: set() for kind in self.arrays}
+        self.unused: list[str] = []
+        self._muscles = set(muscles.names)
+        self._hinges = {n for n, j in single_joints(model).items() if int(model.jnt_type[j]) == _HINGE}
+        # by muscle: the array and the place in it
+        self._places: dict[str, dict[str, tuple[str, int]]] = {"activation": {}, "fiber_length": {}}
+        self._of_muscles: set[int] = set()  # places in act
+        for i, muscle in enumerate(muscles.declarations):
+            held = int(model.actuator_actnum[muscle.actuator]) if muscle.actuator >= 0 else 0
+            own = muscle.actuator < 0
+            array, first = ("own", 2 * i) if own else ("act", int(model.actuator_actadr[muscle.actuator]))
+            if own or held:
+                self._places["activation"][muscle.name] = array, first
+                self._of_muscles.update(range(first, first + held))
+            if muscle.parameters.states == 2 and (own or held == 2):
+                self._places["fiber_length"][muscle.name] = array, first + 1
+
+    def check_widths(self) -> None:
+        """Raise `UserError` where an array has more columns than the model's, or, in an NPZ file, fewer."""
+        for kind, names in self.names.items():
+            given = [int(m[1]) for m in (re.fullmatch(rf"{kind}\[(\d+)\]", n) for n in self.table.names) if m]
+            count = max(given) + 1 if given else int(kind in self.table.names)
+            whole = self.table.source.lower().endswith(".npz")
+            if count > len(names) or (count and whole and count != len(names)):
+                raise UserError(
+                    f"'{self.table.source}': {kind} has {counted(count, 'column')}, the model {len(names)}: "
+                    f"{_few(names) or 'none'}"
+                )
+
+    def take(self, column: str) -> None:
+        """Put a column where it belongs."""
+        for kind, place, turns in self._readings(column):
+            values = self.table[column]
+            self.arrays[kind][:, place] = np.radians(values) if turns and self.table.in_degrees else values
+            self.found[kind].add(place)
+            return
+        self.unused.append(column)
+
+    def _readings(self, column: str) -> Iterator[tuple[str, int, bool]]:
+        """Yield where a column may belong, best first: array, place in it, whether it is a rotation."""
+        for kind, names in self.names.items():
+            if column.startswith(f"{kind}:") and column.removeprefix(f"{kind}:") in names:
+                yield kind, names.index(column.removeprefix(f"{kind}:")), False
+            number = column.removeprefix(f"{kind}[").removesuffix("]")
+            if column == f"{kind}[{number}]" and number.isdigit() and int(number) < len(names):
+                yield kind, int(number), False
+            if column == kind and len(names) == 1:
+                yield kind, 0, False
+        for kind, places in self._places.items():
+            muscle = column.removeprefix(f"{kind}:").removesuffix(f"/{kind}").removesuffix(f".{kind}")
+            if muscle != column and muscle.rpartition("/")[2] in places:
+                yield *places[muscle.rpartition("/")[2]], False
+        for ending, kind in (("/speed", "qvel"), ("_u", "qvel"), ("/value", "qpos"), ("", "qpos")):
+            joint = column.removesuffix(ending).rpartition("/")[2]
+            if column.endswith(ending) and ":" not in column and joint in self.names[kind]:
+                yield kind, self.names[kind].index(joint), joint in self._hinges
+
+    def states(self) -> States:
+        """Return what was sorted, velocities from differences where there are none."""
+        arrays, model, time = self.arrays, self.model, self.table.time
+        remarks = []
+        left = [name for i, name in enumerate(self.names["qpos"]) if i not in self.found["qpos"]]
+        if left:
+            remarks.append(f"{counted(len(left), 'position')} as at the start: {_few(left)}")
+        if not self.found["qvel"]:
+            remarks.append("velocities are differences of the positions")
+            arrays["qvel"] = _differences(model, time, arrays["qpos"])
+        remarks += self._not_given()
+        self.unused = [name for name in self.unused if not self._follows(name)]
+        if self.unused:
+            remarks.append(f"{counted(len(self.unused), 'column')} not about the state: {_few(self.unused)}")
+        return States(time, **arrays, remarks=tuple(remarks))
+
+    def _not_given(self) -> list[str]:
+        """Return remarks on the states of muscles and actuators that no column gives."""
+        activations = [(name, *place) for name, place in self._places["activation"].items()]
+        activations += [
+            (name, "act", i) for i, name in enumerate(self.names["act"]) if i not in self._of_muscles
+        ]
+        fibers = [(name, *place) for name, place in self._places["fiber_length"].items()]
+        remarks = []
+        for what, places, instead in (
+            ("activation", activations, "as at the start"),
+            ("fibre length", fibers, "as at the start, or in static equilibrium"),
+        ):
+            left = [name for name, array, i in places if i not in self.found[array]]
+            if left:
+                remarks.append(
+                    f"{len(left)} of {counted(len(places), what)} not given: {_few(left)}: {instead}"
+                )
+        return remarks
+
+    def _follows(self, column: str) -> bool:
+        """Return whether a column is a result of `mjwrap run` that follows from the state."""
+        kind, mark, name = column.partition(":")
+        muscle = name.partition(":")[0] if kind == "moment_arm" else name
+        return bool(mark) and kind in (*MUSCLE_KINDS, "moment_arm") and muscle in self._muscles
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+
+
+def _differences(model: mujoco.MjModel, time: Array, qpos: Array) -> Array:
+    """Return velocities (T, nv) from positions (T, nq): second order inside, first order at the ends."""
+    found = np.zeros((len(time), model.nv))
+    for k in range(len(time)):
+        a, b = max(k - 1, 0), min(k + 1, len(time) - 1)
+        if b == a:
+            continue
+        if b - a == 1:
+            mujoco.mj_differentiatePos(model, found[k], time[b] - time[a], qpos[a], qpos[b])
+            continue
+        before, after = np.zeros(model.nv), np.zeros(model.nv)
+        h, g = time[k] - time[a], time[b] - time[k]
+        mujoco.mj_differentiatePos(model, before, h, qpos[a], qpos[k])
+        mujoco.mj_differentiatePos(model, after, g, qpos[k], qpos[b])
+        found[k] = (g * before + h * after) / (h + g)
+    return found

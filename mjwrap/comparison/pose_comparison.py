@@ -1,0 +1,99 @@
+"""All poses of a comparison: which motions, in which order, and what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.comparison.jumps import Jump, find_jumps
+from mjwrap.comparison.motion import pristine
+from mjwrap.comparison.twins import Batch, Comparer
+from mjwrap.comparison.verdict import MuscleSummary, Outcome
+from mjwrap.errors import ModelError
+from mjwrap.poses.joint_sweeps import PoseMaker
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class PoseComparison:
+    """What all poses showed: a summary for each muscle, the jumps of both programs, muscles left out and why."""
+
+    muscles: dict[str, MuscleSummary] = field(default_factory=dict)
+    jumps: list[Jump] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+    poses: int = 0
+
+    def total(self, outcome: Outcome) -> int:
+        """Return the number of poses, over all muscles, with an outcome."""
+        return sum(summary.counts[outcome.name] for summary in self.muscles.values())
+
+    @property
+    def at_fault(self) -> int:
+        """Number of poses at which mjwrap is wrong, or has no path where MuJoCo's is a true geodesic."""
+        return sum(summary.at_fault for summary in self.muscles.values())
+
+
+def compare_poses(
+    model: mujoco.MjModel,
+    *,
+    names: Sequence[str] | None = None,
+    samples: int = 101,
+    bases: int = 1,
+    seed: int = 0,
+    base: Array | None = None,
+    each: Callable[[Batch], object] | None = None,
+    progress: Callable[[str, int, int], object] | None = None,
+) -> PoseComparison:
+    """Compare at sweeps of every joint around the base pose and at random poses.
+
+    model: taken as it is, not changed; names: muscles, None for all; samples: poses of a sweep, and random poses;
+    bases: further poses around which joints are swept, the middle of all ranges first, then random ones; base (nq,):
+    qpos0 if None; each: called with every evaluated batch; progress: called with (name, done, all) before each motion.
+    Raises `ModelError` for names that are no muscles.
+    """
+    model = pristine(model)
+    muscles = MuscleSystem(model)
+    known = [*muscles.names, *muscles.native]
+    unknown = [name for name in names or () if name not in known]
+    if unknown:
+        raise ModelError(
+            f"no muscle {', '.join(repr(n) for n in unknown)}; muscles: {', '.join(known) or 'none'}"
+        )
+    comparer = Comparer(muscles, list(names or known))
+    found = PoseComparison(left_out=comparer.left_out)
+    start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
+    makers = [PoseMaker(model, start, seed)]
+    joints = makers[0].joints()
+    if len(joints) > 1 and bases > 0:
+        middle = makers[0].middle()
+        others = makers[0].random(bases).qpos[1:]
+        makers += [PoseMaker(model, pose, seed + i, i) for i, pose in enumerate((middle, *others), 1)]
+    plan = [(maker, joint, axis) for maker in makers for joint in joints for axis in maker.axes(joint)]
+
+    def take(batch: Batch) -> None:
+        found.poses += len(batch.motion.at)
+        for twin in batch.twins:
+            summary = found.muscles.setdefault(
+                twin.name, MuscleSummary(twin.name, muscles.native.get(twin.name, ""))
+            )
+            summary.add(model, batch.motion, twin)
+        if each is not None:
+            each(batch)
+
+    for done, (maker, joint, axis) in enumerate(plan):
+        motion = maker.sweep(joint, samples, axis)
+        if progress is not None:
+            progress(motion.name, done, len(plan) + 1)
+        batch = comparer.evaluate(motion, maker.base)
+        take(batch)
+        found.jumps += find_jumps(comparer, maker, batch, joint, axis)
+    if progress is not None:
+        progress("random poses", len(plan), len(plan) + 1)
+    take(comparer.evaluate(makers[0].random(samples)))
+    return found

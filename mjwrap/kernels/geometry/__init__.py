@@ -1,0 +1,1 @@
+"""Surfaces: nearest points, heights, clearance of segments, and geodesics with their Jacobi fields."""

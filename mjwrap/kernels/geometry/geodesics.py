@@ -1,0 +1,80 @@
+"""The table of surfaces: one row each for its geodesic, its projection and its height.
+
+The integrator is chosen here, outside its loop. A surface's own file holds the mathematics.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels.geometry.closed_forms import capsule, cone, cylinder, sphere
+from mjwrap.kernels.geometry.projection import project
+from mjwrap.kernels.geometry.quadric import quadric
+from mjwrap.kernels.geometry.torus import torus
+from mjwrap.kernels.geometry.user_surface import custom_geodesic
+from mjwrap.kernels.geometry.vectors import cross
+
+W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
+W_BP, W_BQ = lay.W_BP, lay.W_BQ
+KIND, POS = lay.KIND, lay.POS
+S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
+
+
+@apart
+def geodesic(k, node, base_x, base_y, base_z):
+    """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row.
+
+    Points come out in the world frame relative to (base_x, base_y, base_z) [m], directions in the world frame.
+    """
+    kind = node[k, KIND]
+    if kind == lay.CYLINDER:
+        cylinder(k, node)
+    elif kind == lay.SPHERE:
+        sphere(k, node)
+    elif kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
+        quadric(k, node)
+    elif kind == lay.TORUS:
+        torus(k, node)
+    elif kind == lay.CONE:
+        cone(k, node)
+    elif kind == lay.CUSTOM:
+        custom_geodesic(k, node)
+    else:
+        capsule(k, node)
+    x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z
+    node[k, W_P] += x
+    node[k, W_P + 1] += y
+    node[k, W_P + 2] += z
+    node[k, W_Q] += x
+    node[k, W_Q + 1] += y
+    node[k, W_Q + 2] += z
+    cross(node, k, W_BP, W_TP, W_NP)
+    cross(node, k, W_BQ, W_TQ, W_NQ)
+
+
+@jit
+def displace(k, d0, d1, d2, d3, node):
+    """Move obstacle k's saved geodesic by the natural variations (d0, d1, d2, d3) of method section 2.
+
+    d0 slides it along t, d1 shifts its start along b, d2 turns t towards b, d3 lengthens it [m, m, rad, m].
+    """
+    px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
+    tx, ty, tz = node[k, S_T], node[k, S_T + 1], node[k, S_T + 2]
+    px, py, pz, nx, ny, nz = project(node, k, px, py, pz)
+    bx, by, bz = ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx
+    px, py, pz, nx, ny, nz = project(
+        node, k, px + d0 * tx + d1 * bx, py + d0 * ty + d1 * by, pz + d0 * tz + d1 * bz
+    )
+    tx, ty, tz = tx + d2 * bx, ty + d2 * by, tz + d2 * bz
+    along = tx * nx + ty * ny + tz * nz
+    tx, ty, tz = tx - along * nx, ty - along * ny, tz - along * nz
+    inverse = 1.0 / math.sqrt(tx * tx + ty * ty + tz * tz)
+    node[k, S_P] = px
+    node[k, S_P + 1] = py
+    node[k, S_P + 2] = pz
+    node[k, S_T] = tx * inverse
+    node[k, S_T + 1] = ty * inverse
+    node[k, S_T + 2] = tz * inverse
+    node[k, S_ARC] += d3

@@ -1,0 +1,113 @@
+"""Winding: the angle that a string sweeps about an axis or a tube, followed from pose to pose.
+
+On which side a string passes a cylinder, a cone or a torus is a matter of topology. The swept angle holds it: a real
+number that changes continuously with the motion, known from the pose modulo 2 pi.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.geometry.clearance import tube_angle, tube_crossing
+from mjwrap.kernels.geometry.projection import turn_into_frame
+
+KIND, DIM = lay.KIND, lay.DIM
+S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
+W_P, W_Q, W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_P, lay.W_Q, lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
+
+TWO_PI = 2.0 * math.pi
+SMALL_TURN = 0.5 * math.pi  # a change of the swept angle that can only be a continuous motion [rad]
+
+
+@jit
+def nearest_turn(angle, reference):
+    """Return the angle that equals `angle` modulo 2 pi and lies nearest to `reference` [rad]."""
+    return angle + TWO_PI * math.floor((reference - angle) / TWO_PI + 0.5)
+
+
+@jit
+def follow(angle, before):
+    """Return the swept angle that equals `angle` modulo 2 pi and continues `before` [rad].
+
+    A string winds beyond one turn only in small steps: after a large jump nobody can tell, and the way within one turn
+    is taken.
+    """
+    angle = nearest_turn(angle, before)
+    if abs(angle) > TWO_PI and abs(angle - before) > SMALL_TURN:
+        angle -= math.copysign(TWO_PI, angle)
+    return angle
+
+
+@jit
+def tangents_sweep(root_a, root_b, radius):
+    """Return the angle that straight tangents of these lengths from A and B sweep about a circle [rad].
+
+    It is the sum of two arc tangents of root / radius, each less than a quarter turn.
+    """
+    return math.atan2(radius * (root_a + root_b), radius * radius - root_a * root_b)
+
+
+@jit
+def branched(kind):
+    """Return whether the side on which a string passes a surface is topological, and S_SWEEP holds it."""
+    return kind == lay.CYLINDER or kind == lay.ELLIPTIC_CYLINDER or kind == lay.CONE or kind == lay.TORUS
+
+
+@jit
+def swept(k, node):
+    """Return the angle that the path of the last evaluation sweeps, with sign [rad].
+
+    About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the
+    middle of a torus' tube.
+    """
+    if node[k, KIND] == lay.CYLINDER:
+        inverse = 1.0 / node[k, DIM]
+        t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
+        rate = t_phi * inverse
+        free = tangents_sweep(node[k, W_L] * abs(rate), node[k, W_LQ] * abs(rate), 1.0)
+        return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
+    px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
+    size = -node[k, W_L]
+    ex, ey, ez = turn_into_frame(
+        node, k, size * node[k, W_E], size * node[k, W_E + 1], size * node[k, W_E + 2]
+    )
+    ax, ay, az = px + ex, py + ey, pz + ez
+    dx, dy, dz = (
+        node[k, W_Q] - node[k, W_P],
+        node[k, W_Q + 1] - node[k, W_P + 1],
+        node[k, W_Q + 2] - node[k, W_P + 2],
+    )
+    dx, dy, dz = turn_into_frame(node, k, dx, dy, dz)
+    qx, qy, qz = px + dx, py + dy, pz + dz
+    size = node[k, W_LQ]
+    ex, ey, ez = turn_into_frame(
+        node, k, size * node[k, W_EQ], size * node[k, W_EQ + 1], size * node[k, W_EQ + 2]
+    )
+    bx, by, bz = qx + ex, qy + ey, qz + ez
+    if node[k, KIND] == lay.TORUS:
+        major = node[k, DIM]
+        turns = tube_crossing(major, ax, ay, az, px, py, pz) + tube_crossing(major, qx, qy, qz, bx, by, bz)
+        return (
+            tube_angle(major, bx, by, bz)
+            - tube_angle(major, ax, ay, az)
+            + 2.0 * math.pi * (turns + node[k, W_ANGLE])
+        )
+    if node[k, KIND] == lay.ELLIPTIC_CYLINDER:
+        ia, ib = 1.0 / node[k, DIM], 1.0 / node[k, DIM + 1]
+        ax, ay, px, py, qx, qy, bx, by = (
+            ia * ax,
+            ib * ay,
+            ia * px,
+            ib * py,
+            ia * qx,
+            ib * qy,
+            ia * bx,
+            ib * by,
+        )
+    return (
+        math.atan2(ax * py - ay * px, ax * px + ay * py)
+        + node[k, W_ANGLE]
+        + math.atan2(qx * by - qy * bx, qx * bx + qy * by)
+    )

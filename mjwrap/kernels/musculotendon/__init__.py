@@ -1,0 +1,1 @@
+"""Musculotendon units: activation, the laws' curves, fibre and tendon in equilibrium, tension, energy."""

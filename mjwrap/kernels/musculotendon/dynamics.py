@@ -1,0 +1,185 @@
+"""From excitations, states and path lengths to tensions and the states at the end of a step, for all muscles.
+
+A muscle's state is its activation and, where its tendon is elastic, its fibre length [m]. MuJoCo integrates the
+activations of its own muscles; what mjwrap integrates lies in two entries of `act` (KEPT), where MuJoCo saves and
+restores it, or, for muscles without an actuator, in an array of mjwrap's (OWN).
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.musculotendon.activation_dynamics import advance, rate
+from mjwrap.kernels.musculotendon.early_activation import next_activation
+from mjwrap.kernels.musculotendon.fiber import (
+    ELASTIC,
+    LEAST,
+    equilibrium,
+    rigid_fiber,
+    step_fiber,
+    tendon_force,
+)
+from mjwrap.kernels.musculotendon.tension import DEGROOTE_FREGLY, MILLARD
+from mjwrap.kernels.musculotendon.tension import tension as law_tension
+
+# where a muscle's state comes from
+FROM_ACT, FROM_CTRL, OWN, DIRECT, KEPT, EARLY = 0, 1, 2, 3, 4, 5
+TIMES = 5  # columns of `times`: two time constants [s] and smoothness; EARLY: see `early.next_activation`
+NO_FIBER = 0.0  # stands where no fibre length is known: the muscle starts at static equilibrium
+
+
+@jit
+def read_states(
+    source, index, control, low, high, form, times, act, ctrl, own, excitation, since, timestep,
+    activation, fiber, drive,
+):  # fmt: skip
+    """Write activation, fibre length [m] and excitation of every muscle (n,), `since` [s] after a step's start.
+
+    What mjwrap integrates is read at the start only: a later stage of Runge-Kutta goes on from there.
+    Activations: FROM_ACT act[index]; EARLY what that will be a `timestep` [s] later; FROM_CTRL the drive; DIRECT the
+    drive; OWN own[m, 0]; KEPT act[index], with the fibre length beside it. The drive is the excitation for OWN and
+    DIRECT, else ctrl[control] clamped to [low, high].
+    """
+    for m in range(source.shape[0]):
+        own_drive = source[m] == OWN or source[m] == DIRECT
+        drive[m] = excitation[m] if own_drive else min(max(ctrl[control[m]], low[m]), high[m])
+        if source[m] == FROM_ACT:
+            activation[m] = act[index[m]]
+        elif source[m] == EARLY:
+            activation[m] = next_activation(form[m], times, m, act[index[m]], drive[m], timestep)
+        elif source[m] == FROM_CTRL or source[m] == DIRECT:
+            activation[m] = drive[m]
+        elif since <= 0.0:
+            activation[m] = min(max(act[index[m]], 0.0), 1.0) if source[m] == KEPT else own[m, 0]
+            fiber[m] = act[index[m] + 1] if source[m] == KEPT else own[m, 1]
+
+
+@jit
+def write_states(source, index, activation, fiber, act, own):
+    """Put the states that mjwrap integrates, (n,) each, back where `read_states` finds them."""
+    for m in range(source.shape[0]):
+        if source[m] == KEPT:
+            act[index[m]] = activation[m]
+            act[index[m] + 1] = fiber[m]
+        elif source[m] == OWN:
+            own[m, 0] = activation[m]
+            own[m, 1] = fiber[m]
+
+
+@jit
+def has_fiber(law):
+    """Return whether a law knows a fibre and its tendon."""
+    return law in (DEGROOTE_FREGLY, MILLARD)
+
+
+@jit
+def is_elastic(law, params, m):
+    """Return whether the fibre length of muscle m is a state."""
+    return has_fiber(law) and params[m, ELASTIC] != 0.0
+
+
+@jit
+def drive_muscles(
+    law, params, source, form, times, off, since, ahead, drive, start_activation, start_fiber, start_length,
+    length, velocity, activation, fiber, tension, next_activation, next_fiber, status,
+):  # fmt: skip
+    """Write every muscle's tension, and its state at the end of the step, (n,) each.
+
+    The states in start_activation, start_fiber and start_length are `since` [s] old (a stage of Runge-Kutta; written
+    here where it is zero); the tension is to act for `ahead` [s] from here. Over both an elastic tendon takes one
+    implicit step, to the length that the path will have, so its tension is that at the end; with neither it is the
+    tendon's at this state. Elsewhere the tension is that of this state. A muscle without a path (status) keeps its
+    tension and fibre length; one with a minus sign goes on and loses it (`coupling.measure_muscles`).
+    """
+    duration = since + ahead
+    for m in range(law.shape[0]):
+        a, end = start_activation[m], start_activation[m]
+        if (source[m] == OWN or source[m] == KEPT) and not off[m]:
+            a = advance(form[m], end, drive[m], times[m, 0], times[m, 1], times[m, 2], since)
+            if ahead > 0.0:
+                end = advance(form[m], end, drive[m], times[m, 0], times[m, 1], times[m, 2], duration)
+            else:
+                end = a
+        if since <= 0.0:
+            start_length[m] = length[m]
+        activation[m], next_activation[m], next_fiber[m] = a, end, start_fiber[m]
+        if status[m] > lay.CONVERGED:
+            continue
+        status[m] = -status[m]
+        if not is_elastic(law[m], params, m):
+            force = law_tension(law[m], params, m, a, length[m], velocity[m])
+            fiber[m] = rigid_fiber(params, m, length[m]) if has_fiber(law[m]) else NO_FIBER
+        else:
+            if start_fiber[m] <= NO_FIBER:
+                start_fiber[m] = equilibrium(law[m], params, m, start_activation[m], length[m])[0]
+            start_fiber[m] = max(start_fiber[m], params[m, LEAST])
+            fiber[m] = start_fiber[m]
+            next_fiber[m] = start_fiber[m]
+            if off[m] or duration <= 0.0:
+                force = tendon_force(law[m], params, m, length[m], fiber[m])
+            else:
+                growth = rate(form[m], drive[m], end, times[m, 0], times[m, 1], times[m, 2])
+                next_fiber[m], force, _, _ = step_fiber(
+                    law[m], params, m, start_activation[m], end, growth,
+                    start_length[m], length[m] + ahead * velocity[m], velocity[m], start_fiber[m], duration,
+                )  # fmt: skip
+                if since > 0.0:
+                    fiber[m] = next_fiber[m]
+        if off[m]:
+            force = 0.0
+        if math.isfinite(force):
+            tension[m] = force
+        else:
+            status[m] = lay.NON_FINITE
+            next_fiber[m] = start_fiber[m]
+
+
+@jit
+def simulate(
+    law,
+    params,
+    form,
+    times,
+    time,
+    length,
+    velocity,
+    drive,
+    growth,
+    prescribed,
+    activation,
+    fiber,
+    tension,
+    counts,
+):
+    """Run one muscle, row 0 of params, along prescribed lengths: arrays (T,) of time [s], length [m], velocity [m/s].
+
+    drive: excitations, or activations where `prescribed`, and then growth their rates [1/s]. activation[0] and fiber[0]
+    are the start (NO_FIBER: at equilibrium); activation, fiber and tension (T,) are filled, counts (T, 2) with
+    evaluations and status of each step.
+    """
+    elastic = is_elastic(law, params, 0)
+    if prescribed:
+        activation[0] = drive[0]
+    for k in range(time.shape[0]):
+        duration, rise = 0.0, growth[k]
+        if k > 0:
+            duration = time[k] - time[k - 1]
+            activation[k] = drive[k]
+            if not prescribed:
+                u = drive[k - 1]
+                activation[k] = advance(form, activation[k - 1], u, times[0], times[1], times[2], duration)
+                rise = rate(form, u, activation[k], times[0], times[1], times[2])
+        if not elastic:
+            tension[k] = law_tension(law, params, 0, activation[k], length[k], velocity[k])
+            fiber[k] = rigid_fiber(params, 0, length[k]) if has_fiber(law) else NO_FIBER
+        elif k == 0:
+            if fiber[0] <= NO_FIBER:
+                fiber[0], counts[0, 0], counts[0, 1] = equilibrium(law, params, 0, activation[0], length[0])
+            tension[0] = tendon_force(law, params, 0, length[0], fiber[0])
+        else:
+            fiber[k], tension[k], counts[k, 0], counts[k, 1] = step_fiber(
+                law, params, 0, activation[k - 1], activation[k], rise,
+                length[k - 1], length[k], velocity[k], fiber[k - 1], duration,
+            )  # fmt: skip

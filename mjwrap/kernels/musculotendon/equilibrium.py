@@ -1,0 +1,197 @@
+"""Balance of fibre and tendon: a law's curves by its code, the forces and their slopes, and the search for the root.
+
+Lengths in l_o, velocities in v_max l_o, forces in F_max; tendon lengths in l_s.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.musculotendon import degroote_fregly, millard
+
+MILLARD = millard.CODE
+
+NORMAL = 0
+AT_MINIMUM = 1  # the fibre is at its minimum length, and does not balance the tendon
+SLACK_TENDON = 2  # no tension; the fibre's own force is zero too
+NOT_CONVERGED = 3
+
+MOST = 150  # evaluations in one solution; a step of a simulation takes two or three
+CLOSE = 1e-6  # [F_max] imbalance from which one more Newton step ends far below 1e-8
+SMALL = 1e-6  # [l_s] largest such step of the tendon: the curvature of a tendon's curve is at most 2e3
+STRAINED = 1.08  # [l_s] tendon length from which at most the iteration starts
+# [F_max] imbalance above which an exponential tendon is taken by its logarithm, and what is added to the forces for it
+STEEP, OFFSET = 0.2, 0.2
+FASTEST = millard.FASTEST
+
+
+# ------------------------------------------------------------------------------- a law's curves, by code
+
+
+@jit
+def length_curves(law, x):
+    """Return the active force-length curve, its slope, the passive one and its slope at fibre length x [l_o]."""
+    if law == MILLARD:
+        active, d_active = millard.active(x)
+        passive, d_passive = millard.passive(x)
+    else:
+        active, d_active = degroote_fregly.active(x)
+        passive, d_passive = degroote_fregly.passive(x)
+    return active, d_active, passive, d_passive
+
+
+@jit
+def velocity_curve(law, v):
+    """Return the force-velocity curve and its slope at fibre velocity v [v_max l_o]."""
+    if law == MILLARD:
+        return millard.velocity(v)
+    return degroote_fregly.velocity(v)
+
+
+@jit
+def inverse_velocity(law, force):
+    """Return the fibre velocity [v_max l_o] at which the force-velocity curve has a value."""
+    if law == MILLARD:
+        return millard.inverse_velocity(force)
+    return degroote_fregly.inverse_velocity(force)
+
+
+@jit
+def balancing_velocity(law, strength, damping, wanted, close):
+    """Return v with strength f_v(v) + damping v = wanted, within a bound, and the force-velocity curve and its slope.
+
+    close: largest last Newton step; the error left is its square.
+    """
+    if damping == 0.0 and strength == 0.0:
+        v = FASTEST if wanted > 0.0 else (-FASTEST if wanted < 0.0 else 0.0)
+        force, slope = velocity_curve(law, v)
+        return v, force, slope
+    if law == MILLARD:
+        v, force, slope = millard.balancing_velocity(strength, damping, wanted, close)
+    else:
+        v, force, slope = degroote_fregly.balancing_velocity(strength, damping, wanted, close)
+    return min(max(v, -FASTEST), FASTEST), force, slope
+
+
+@jit
+def tendon_curve(law, x):
+    """Return the tendon's force [F_max] and its slope at tendon length x [l_s]: both zero where it is slack."""
+    if x <= 1.0:
+        return 0.0, 0.0
+    if law == MILLARD:
+        return millard.tendon(x)
+    return degroote_fregly.tendon(x)
+
+
+# --------------------------------------------------------------------------- balance of tendon and fibre
+
+
+@jit
+def forces(law, activation, damping, height, ratio, reach, x, v):
+    """Return forces and slopes [F_max]: the tendon's, its slope in x, the fibre's along the tendon, its slope in x, the
+    tendon's slope in its length [l_s], the fibre's in activation and in velocity [v_max l_o].
+
+    height, x [l_o]: fibre height and length, x above height; ratio l_o / l_s; reach: unit's length [l_s]; v: fibre
+    velocity.
+    """
+    along = math.sqrt(x * x - height * height)
+    pull, stiffness = tendon_curve(law, reach - ratio * along)
+    curves = length_curves(law, x)
+    speed, d_speed = velocity_curve(law, v)
+    return _joined(activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed)
+
+
+@jit
+def balanced_forces(law, activation, damping, height, ratio, reach, x, least, close):
+    """Return the velocity that balances at x, and what `forces` does there; none shortens at the `least` length.
+
+    close as of `balancing_velocity`; with zero damping and activation the bound may stand for the velocity.
+    """
+    along = math.sqrt(x * x - height * height)
+    pull, stiffness = tendon_curve(law, reach - ratio * along)
+    curves = length_curves(law, x)
+    wanted = pull * x / along - curves[2]
+    v, speed, d_speed = balancing_velocity(law, activation * curves[0], damping, wanted, close)
+    if v < 0.0 and x <= least:
+        v = 0.0
+        speed, d_speed = velocity_curve(law, v)
+    return v, _joined(
+        activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed
+    )
+
+
+@jit
+def _joined(activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed):
+    """Return what `forces` does from the curves' values and slopes."""
+    active, d_active, passive, d_passive = curves
+    cosine = along / x
+    strength = active * speed
+    force = activation * strength + passive + damping * v
+    slope = activation * d_active * speed + d_passive
+    turning = force * height * height / (along * x * x)
+    drag = (activation * active * d_speed + damping) * cosine
+    return (
+        pull, -stiffness * ratio / cosine, force * cosine, slope * cosine + turning,
+        stiffness, strength * cosine, drag,
+    )  # fmt: skip
+
+
+@jit
+def rest_imbalance(law, activation, height, ratio, reach, x):
+    """Return the tendon's force less that of a fibre at rest [F_max] and the slope in x; arguments as of `forces`."""
+    pull, d_pull, force, d_force, _, _, _ = forces(law, activation, 0.0, height, ratio, reach, x, 0.0)
+    return pull - force, d_pull - d_force
+
+
+@jit
+def balance(law, activation, damping, height, ratio, reach, before, rate, low, high, start, close):
+    """Return the fibre length [l_o] in [low, high] that balances, the tendon's force [F_max], evaluations and status.
+
+    The fibre's velocity is (x - before) rate: for backward Euler, rate is one over (v_max x duration).
+    The tendon must pull no less than the fibre at `low`, else the fibre rests there, and no more at `high`. Newton's
+    steps from `start`, kept in a bracket that every evaluation narrows. A step taken within `close` [F_max] of balance
+    is the last, unless it crosses the tendon's slack length, where the slope jumps; with close zero the steps end at
+    rounding.
+    """
+    least, x, pull = low, start, 0.0
+    small = SMALL if close <= CLOSE else close
+    low_known = high_known = False
+    along = max(reach - 1.0, 0.0) / ratio
+    slack = math.sqrt(along * along + height * height)  # at this fibre length the tendon begins to pull
+    along = max(reach - STRAINED, 0.0) / ratio
+    strained = min(max(math.sqrt(along * along + height * height), low), high)
+    x = max(x, strained)
+    for k in range(1, MOST + 1):
+        pull, d_pull, force, d_force, _, _, drag = forces(
+            law, activation, damping, height, ratio, reach, x, (x - before) * rate
+        )
+        d_force += drag * rate
+        off, slope = pull - force, d_pull - d_force
+        if off <= 0.0 and x <= least:
+            return least, pull, k, AT_MINIMUM
+        step = -off / slope if slope < 0.0 else 0.0
+        if off > STEEP and law != MILLARD and force >= 0.0:
+            # the tendon's exponential outweighs all else: the logarithms of both forces are nearly straight
+            bend = d_pull / (pull + OFFSET) - d_force / (force + OFFSET)
+            step = -math.log((pull + OFFSET) / (force + OFFSET)) / bend if bend < 0.0 else 0.0
+        new = x + step
+        if abs(step) <= 1e-15 * x and abs(off) <= CLOSE:
+            return x, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
+        if (
+            abs(off) <= close and slope < 0.0 and new > least and (x < slack) == (new < slack)
+            and abs(step) * ratio * x <= small * math.sqrt(x * x - height * height)
+        ):  # fmt: skip
+            pull = max(pull + d_pull * step, 0.0)
+            return new, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
+        if off > 0.0:
+            low, low_known = x, True
+        else:
+            high, high_known = x, True
+        if step == 0.0 or (new <= low and low_known) or (new >= high and high_known):
+            new = 0.5 * (low + high)
+        new = min(max(new, low if x <= strained else max(low, strained)), high)
+        if new == x:  # the bracket has no number inside
+            return x, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
+        x = new
+    return x, pull, MOST, NOT_CONVERGED

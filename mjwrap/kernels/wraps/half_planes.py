@@ -1,0 +1,266 @@
+"""First guesses for wraps without a closed form, in a half plane that is bounded by the line AB.
+
+The surface has a section with the half plane, and the shortest way over it is the convex hull over its upper
+boundary: right to
+the sampling of the boundary, for any surface that has a height. An ellipsoid's section is an ellipse, with tangents in
+closed form. Everything in the frame S of the obstacle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.geometry.clearance import bounding_radius
+from mjwrap.kernels.geometry.projection import height, project
+from mjwrap.kernels.geometry.stoermer import carray, stack
+from mjwrap.kernels.geometry.vectors import unit
+
+KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
+S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
+
+COLUMNS = 14  # samples of a section's upper boundary
+EVEN = 1e-4  # to which a section's boundary is found, in the surface's size
+LIFTS = 3  # corrections where the way over a section meets more of it
+BRIDGE = (
+    0.1  # a string that stands off the surface so high, in its size, between two columns bridges a hollow
+)
+NEAR = 1e-4  # a section that begins so near to A, in the surface's size, begins at A
+MARCH = 60  # steps to a section's boundary
+GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # of an arc of an ellipse, for a guess
+
+
+@jit
+def _climb(node, k, x, y, z, wx, wy, wz, start):
+    """Return how far along w the surface is left, from a start inside it (x, y, z: the column's foot)."""
+    lo = start
+    step = 0.05 * node[k, SIZE]
+    h = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
+    hi = lo
+    for _ in range(MARCH):
+        hi = lo + max(-h, step)
+        h = height(node, k, x + hi * wx, y + hi * wy, z + hi * wz)
+        if h >= 0.0:
+            break
+        lo = hi
+        step *= 1.2
+    low = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
+    for _ in range(8):  # regula falsi, the Illinois way
+        if h <= EVEN * node[k, SIZE]:
+            break
+        middle = (lo * h - hi * low) / (h - low)
+        g = height(node, k, x + middle * wx, y + middle * wy, z + middle * wz)
+        if g >= 0.0:
+            hi, h = middle, g
+            low *= 0.5
+        else:
+            lo, low = middle, g
+            h *= 0.5
+    return hi
+
+
+@jit
+def _hull(count, size, first, step, top, chain):
+    """Write the indices of the columns on the upper convex hull between (0, 0) and (size, 0) to chain; return how
+    many.
+    """
+    m = 0
+    for i in range(count + 1):
+        x, y = first + i * step, 0.0
+        if i < count:
+            y = top[i]
+            if y <= 0.0 or x <= 0.0 or x >= size:
+                continue
+        else:
+            x = size
+        while m > 0:
+            j = int(chain[m - 1])
+            jx, jy = first + j * step, top[j]
+            ox, oy = 0.0, 0.0
+            if m > 1:
+                o = int(chain[m - 2])
+                ox, oy = first + o * step, top[o]
+            if (jx - ox) * (y - oy) - (jy - oy) * (x - ox) < 0.0:
+                break
+            m -= 1
+        if i < count:
+            chain[m] = i
+            m += 1
+    return m
+
+
+@jit
+def _over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
+    """Sample the section at COLUMNS columns and pull a string over it; return the number of the hull's columns."""
+    for i in range(COLUMNS):
+        x = first + i * step
+        px, py, pz = ax + x * ux, ay + x * uy, az + x * uz
+        top[i] = -1.0
+        if 0.0 < x < size and height(node, k, px, py, pz) < 0.0:
+            top[i] = _climb(node, k, px, py, pz, wx, wy, wz, 0.0)
+    m = _hull(COLUMNS, size, first, step, top, chain)
+    for _ in range(LIFTS):
+        lifted = False
+        j = 0
+        for i in range(COLUMNS):
+            x = first + i * step
+            while j < m and chain[j] < i:
+                j += 1
+            if (j < m and chain[j] == i) or not 0.0 < x < size or m == 0:
+                continue
+            lx, ly, rx, ry = 0.0, 0.0, size, 0.0
+            if j > 0:
+                lx, ly = first + chain[j - 1] * step, top[int(chain[j - 1])]
+            if j < m:
+                rx, ry = first + chain[j] * step, top[int(chain[j])]
+            y = ly + (ry - ly) * (x - lx) / (rx - lx)
+            px, py, pz = ax + x * ux, ay + x * uy, az + x * uz
+            if height(node, k, px + y * wx, py + y * wy, pz + y * wz) < -1e-6 * node[k, SIZE]:
+                top[i] = _climb(node, k, px, py, pz, wx, wy, wz, y)
+                lifted = True
+        if not lifted:
+            break
+        m = _hull(COLUMNS, size, first, step, top, chain)
+    return m
+
+
+@jit
+def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
+    """Do what `_guess` does in closed form: in the image in which the ellipsoid is a sphere the section is a circle."""
+    a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
+    px, py, pz = ax / a, ay / b, az / c
+    dx, dy, dz = size * ux / a, size * uy / b, size * uz / c
+    vx, vy, vz = wx / a, wy / b, wz / c
+    inverse = 1.0 / (dx * dx + dy * dy + dz * dz)
+    along = (vx * dx + vy * dy + vz * dz) * inverse
+    vx, vy, vz = unit(vx - along * dx, vy - along * dy, vz - along * dz)  # at right angles to AB in the plane
+    scale = math.sqrt(inverse)
+    dx, dy, dz = dx * scale, dy * scale, dz * scale
+    x, y = -(px * dx + py * dy + pz * dz), -(px * vx + py * vy + pz * vz)  # the centre, seen from A
+    square = 1.0 - max(px * px + py * py + pz * pz - x * x - y * y, 0.0)
+    if square <= 0.0:
+        return False
+    radius, far = math.sqrt(square), 1.0 / scale  # of the circle; distance of A and B
+    root_a = math.sqrt(max(x * x + y * y - square, 0.0))
+    root_b = math.sqrt(max((far - x) ** 2 + y * y - square, 0.0))
+    # directions of the normals at P and Q, as angles: tangents from A and B that pass over the circle
+    start = math.atan2(-y, -x) - math.atan2(root_a, radius)
+    stop = math.atan2(-y, far - x) + math.atan2(root_b, radius)
+    arc = start - stop
+    if arc > math.pi * 1.5:
+        arc -= 2.0 * math.pi
+    elif arc < -math.pi * 0.5:
+        arc += 2.0 * math.pi
+    arc = max(arc, 0.0)
+    total = 0.0
+    for i in range(GAUSS.shape[0]):
+        g = start - 0.5 * arc * (1.0 + GAUSS[i])
+        f, e = math.sin(g), -math.cos(g)
+        total += GAUSS_WEIGHTS[i] * math.sqrt(
+            (a * (f * dx + e * vx)) ** 2 + (b * (f * dy + e * vy)) ** 2 + (c * (f * dz + e * vz)) ** 2
+        )
+    x, y = x + radius * math.cos(start), y + radius * math.sin(start)
+    px, py, pz = ax + a * (x * dx + y * vx), ay + b * (x * dy + y * vy), az + c * (x * dz + y * vz)
+    x, y = math.sin(start), -math.cos(start)  # tangent there, and so is its image on the ellipsoid
+    tx, ty, tz = a * (x * dx + y * vx), b * (x * dy + y * vy), c * (x * dz + y * vz)
+    place(k, node, px, py, pz, tx, ty, tz, 0.5 * arc * radius * total)
+    return True
+
+
+@jit
+def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
+    """Write a first guess for the string over the section with the half plane towards w; return whether there is one.
+
+    u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest.
+    """
+    if node[k, KIND] == lay.ELLIPSOID:
+        return _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size)
+    memory = carray(stack(), (80,))
+    top, chain = memory[0:COLUMNS], memory[COLUMNS : 2 * COLUMNS]
+    lo, hi = 0.0, size
+    reach = bounding_radius(node, k)
+    if reach < math.inf:
+        centre = -(ax * ux + ay * uy + az * uz)
+        lo, hi = max(lo, centre - reach), min(hi, centre + reach)
+    m = 0
+    first, step = 0.0, 0.0
+    for _ in range(2):
+        if not hi > lo:
+            return False
+        step = (hi - lo) / (COLUMNS - 2)
+        first = deepest - step * math.ceil((deepest - lo) / step)  # one column stands at the deepest point
+        m = _over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain)
+        if m == 0:
+            return False
+        lo, hi = first + (chain[0] - 1) * step, first + (chain[m - 1] + 1) * step
+        deepest = first + chain[0] * step
+    start, stop = 0, m  # the part of the hull that lies on the surface: a string bridges a hollow
+    for j in range(1, m):
+        i, o = int(chain[j]), int(chain[j - 1])
+        x, y = first + 0.5 * (i + o) * step, 0.5 * (top[i] + top[o])
+        px, py, pz = ax + x * ux + y * wx, ay + x * uy + y * wy, az + x * uz + y * wz
+        if i - o > 2 and height(node, k, px, py, pz) > BRIDGE * node[k, SIZE]:
+            if node[k, lay.TWIN] == 0.0:
+                stop = j
+                break
+            start = j
+    arc = 0.0
+    for j in range(start + 1, stop):
+        i, o = int(chain[j]), int(chain[j - 1])
+        arc += math.hypot((i - o) * step, top[i] - top[o])
+    x, y = first + chain[start] * step, top[int(chain[start])]
+    p, q = x, y
+    if math.hypot(x, y) < NEAR * node[k, SIZE]:  # A is on the surface: look ahead
+        p, q = size, 0.0
+        if start + 1 < m:
+            p, q = first + chain[start + 1] * step - x, top[int(chain[start + 1])] - y
+    place(
+        k, node, ax + x * ux + y * wx, ay + x * uy + y * wy, az + x * uz + y * wz,
+        p * ux + q * wx, p * uy + q * wy, p * uz + q * wz, arc,
+    )  # fmt: skip
+    return True
+
+
+@jit
+def place(k, node, x, y, z, tx, ty, tz, arc):
+    """Start obstacle k's geodesic at the surface point next to (x, y, z), along t as far as it is tangent."""
+    x, y, z, nx, ny, nz = project(node, k, x, y, z)
+    along = tx * nx + ty * ny + tz * nz
+    tx, ty, tz = tx - along * nx, ty - along * ny, tz - along * nz
+    size = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if size < 1e-12 * node[k, SIZE]:
+        tx, ty, tz = across(nx, ny, nz)
+        size = 1.0
+    node[k, S_MODE] = lay.TOUCHED
+    node[k, S_P] = x
+    node[k, S_P + 1] = y
+    node[k, S_P + 2] = z
+    node[k, S_T] = tx / size
+    node[k, S_T + 1] = ty / size
+    node[k, S_T + 2] = tz / size
+    node[k, S_ARC] = arc
+
+
+@jit
+def place_on_tube(k, node, x, y, z, tx, ty, tz, angle):
+    """Start at the given angle round a torus' tube, where it is nearest to the point (x, y, z)."""
+    major, minor = node[k, DIM], node[k, DIM + 1]
+    rho = max(math.sqrt(x * x + y * y), 1e-12 * major)
+    reach = (major + minor * math.cos(angle)) / rho
+    place(k, node, reach * x, reach * y, minor * math.sin(angle), tx, ty, tz, 0.0)
+
+
+@jit
+def across(x, y, z):
+    """Return a unit vector at right angles to a unit vector."""
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        x, y, z = 0.0, z, -y
+    elif abs(y) <= abs(z):
+        x, y, z = -z, 0.0, x
+    else:
+        x, y, z = y, -x, 0.0
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size

@@ -1,0 +1,277 @@
+"""Closed-form wraps of the surfaces with straight rulings: cylinder, elliptic cylinder, cone.
+
+The side on which a string passes them is a matter of topology. It is held by the angle that the string sweeps
+about the axis from A to B, a real number that follows the motion continuously: modulo 2 pi it is known from the pose,
+and the saved value says which multiple is meant. The string touches where the swept angle exceeds what straight
+tangents from A and B leave free. An elliptic cylinder is treated in the affine image in which it is a circular one; a
+string that leaves a cone over its apex is free.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.geometry.closed_forms import cone_angle
+from mjwrap.kernels.geometry.winding import TWO_PI, follow, tangents_sweep
+
+DIM, HINT = lay.DIM, lay.HINT
+S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
+
+INSIDE = 1.0 - 1e-9  # a point closer to the axis than this share of the radius is inside
+CLEAR = 1e-12  # a wrap that would bend the string by less [rad] counts as not touching
+
+A_INSIDE = 1
+B_INSIDE = 2
+SLIPPED = 4  # the string was wound about a cone and would slip over its apex
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)  # of an arc of the ellipse, per radian or less
+
+
+@jit
+def set_free(node, k, sweep):
+    """Leave the surface untouched."""
+    node[k, S_MODE] = lay.FREE
+    node[k, S_SWEEP] = sweep
+    node[k, S_ARC] = 0.0
+
+
+@jit
+def _cross_each_other(ax, ay, px, py, bx, by, qx, qy):
+    """Return whether the straight segments from A to P and from B to Q meet, seen along the axis."""
+    ux, uy, vx, vy = px - ax, py - ay, qx - bx, qy - by
+    determinant = vx * uy - vy * ux
+    if determinant == 0.0:
+        return False
+    wx, wy = ax - bx, ay - by
+    s = (vy * wx - vx * wy) / determinant
+    r = (uy * wx - ux * wy) / determinant
+    return 0.0 <= s <= 1.0 and 0.0 <= r <= 1.0
+
+
+@jit
+def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
+    """Return the swept angle for a path that passes a cylinder on the hint's side, at a cold start.
+
+    The straight string stands where it is free and its point nearest to the axis lies on that side. Otherwise the way
+    round whose middle lies nearer to the hint is taken, be it the long one, unless it crosses itself: the rule that
+    MuJoCo's side sites follow (`mju_wrap` in engine_util_misc.c).
+    """
+    size = math.sqrt(hint_x * hint_x + hint_y * hint_y)
+    if size < 1e-9 * radius:
+        return principal
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    foot = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    cx, cy = ax + foot * dx, ay + foot * dy
+    if cx * cx + cy * cy > radius * radius and cx * hint_x + cy * hint_y >= 0.0:
+        return principal
+    turn = 1.0 if principal >= 0.0 else -1.0
+    start, end = math.atan2(ay, ax), math.atan2(by, bx)
+    middle = start + 0.5 * (principal + turn * (alpha_a - alpha_b))
+    towards = math.cos(middle) * hint_x + math.sin(middle) * hint_y
+    other = principal - turn * TWO_PI
+    middle = start + 0.5 * (other - turn * (alpha_a - alpha_b))
+    away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
+    if towards >= away:
+        return principal
+    start -= turn * alpha_a
+    end += turn * alpha_b
+    px, py = radius * math.cos(start), radius * math.sin(start)
+    qx, qy = radius * math.cos(end), radius * math.sin(end)
+    return principal if _cross_each_other(ax, ay, px, py, bx, by, qx, qy) else other
+
+
+@jit
+def _hinted(k, node):
+    """Return whether a hint chooses the side of a surface: at a cold start."""
+    return node[k, S_MODE] == lay.COLD and node[k, HINT] > 0.0
+
+
+@jit
+def _sweep(k, node, ax, ay, bx, by):
+    """Return the angle that the string sweeps about the axis: the saved branch's, or else the shorter one [rad]."""
+    sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+    return sweep if node[k, S_MODE] == lay.COLD else follow(sweep, node[k, S_SWEEP])
+
+
+@jit
+def _contact_normal(ax, ay, radius, root, turn):
+    """Return the unit vector at A's polar angle, turned by the angle whose cosine is radius / rho."""
+    square = ax * ax + ay * ay
+    if root > 0.0:
+        return (ax * radius - turn * ay * root) / square, (ay * radius + turn * ax * root) / square
+    rho = max(math.sqrt(square), 1e-300)
+    return ax / rho, ay / rho
+
+
+@jit
+def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
+    """Wrap a string from A to B over a cylinder about z (obstacle-set method, Garner & Pandy 2000)."""
+    radius = node[k, DIM]
+    square_a, square_b, square = ax * ax + ay * ay, bx * bx + by * by, radius * radius
+    limit = INSIDE * INSIDE * square
+    inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
+    root_a = math.sqrt(max(square_a - square, 0.0))
+    root_b = math.sqrt(max(square_b - square, 0.0))
+    sweep = _sweep(k, node, ax, ay, bx, by)
+    if _hinted(k, node):
+        alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
+        hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
+        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+    arc = abs(sweep) - tangents_sweep(root_a, root_b, radius)
+    if arc <= CLEAR:
+        set_free(node, k, sweep)
+        return inside
+    turn = 1.0 if sweep >= 0.0 else -1.0
+    nx, ny = _contact_normal(ax, ay, radius, root_a, turn)
+    flat = root_a + radius * arc + root_b  # the whole path, seen along the axis
+    slope = (bz - az) / flat
+    cosine = 1.0 / math.sqrt(1.0 + slope * slope)
+    node[k, S_MODE] = lay.TOUCHED
+    node[k, S_SWEEP] = sweep
+    node[k, S_P] = radius * nx
+    node[k, S_P + 1] = radius * ny
+    node[k, S_P + 2] = az + slope * root_a
+    node[k, S_T] = -turn * cosine * ny
+    node[k, S_T + 1] = turn * cosine * nx
+    node[k, S_T + 2] = cosine * slope
+    node[k, S_ARC] = radius * arc / cosine
+    return inside
+
+
+@jit
+def _ellipse_arc(a, b, start, arc):
+    """Return the length of (a cos w, b sin w) from w = start over the angle arc, of either sign."""
+    pieces = int(math.ceil(abs(arc)))
+    half = 0.5 * arc / max(pieces, 1)
+    total = 0.0
+    for j in range(pieces):
+        middle = start + (2 * j + 1) * half
+        for i in range(_NODES.shape[0]):
+            w = middle + half * _NODES[i]
+            x, y = a * math.sin(w), b * math.cos(w)
+            total += _WEIGHTS[i] * math.sqrt(x * x + y * y)
+    return abs(half) * total
+
+
+@jit
+def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
+    """Wrap a string from A to B over an elliptic cylinder about z; the arc's length to about 1e-10."""
+    a, b = node[k, DIM], node[k, DIM + 1]
+    px, py, qx, qy = ax / a, ay / b, bx / a, by / b
+    square_a, square_b = px * px + py * py, qx * qx + qy * qy
+    limit = INSIDE * INSIDE
+    inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
+    root_a = math.sqrt(max(square_a - 1.0, 0.0))
+    root_b = math.sqrt(max(square_b - 1.0, 0.0))
+    sweep = _sweep(k, node, px, py, qx, qy)
+    if _hinted(k, node):
+        hint_x, hint_y = node[k, HINT + 1] / a, node[k, HINT + 2] / b
+        sweep = _hinted_sweep(
+            px, py, qx, qy, sweep, math.atan(root_a), math.atan(root_b), hint_x, hint_y, 1.0
+        )
+    arc = abs(sweep) - tangents_sweep(root_a, root_b, 1.0)
+    if arc <= CLEAR:
+        set_free(node, k, sweep)
+        return inside
+    turn = 1.0 if sweep >= 0.0 else -1.0
+    nx, ny = _contact_normal(px, py, 1.0, root_a, turn)
+    mx, my = _contact_normal(qx, qy, 1.0, root_b, -turn)
+    out = math.hypot(a * nx - ax, b * ny - ay)
+    round_it = _ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
+    flat = out + round_it + math.hypot(a * mx - bx, b * my - by)
+    slope = (bz - az) / flat
+    cosine = 1.0 / math.sqrt(1.0 + slope * slope)
+    tx, ty = -turn * a * ny, turn * b * nx
+    scale = cosine / math.sqrt(tx * tx + ty * ty)
+    node[k, S_MODE] = lay.TOUCHED
+    node[k, S_SWEEP] = sweep
+    node[k, S_P] = a * nx
+    node[k, S_P + 1] = b * ny
+    node[k, S_P + 2] = az + slope * out
+    node[k, S_T] = scale * tx
+    node[k, S_T + 1] = scale * ty
+    node[k, S_T + 2] = cosine * slope
+    node[k, S_ARC] = round_it / cosine
+    return inside
+
+
+@jit
+def _tangent_ruling(rho, reach):
+    """Return the angle between A and the rulings that its tangent planes touch, and its distance from them."""
+    if rho <= abs(
+        reach
+    ):  # inside, or inside the mirrored cone beyond the apex, where no tangent plane exists
+        return (0.0 if reach > 0.0 else math.pi), 0.0
+    root = math.sqrt((rho - reach) * (rho + reach))
+    return math.atan2(root, reach), root
+
+
+@jit
+def wrap_cone(k, ax, ay, az, bx, by, bz, node):
+    """Wrap a string from A to B over a cone about z.
+
+    The tangent planes through A and B unfold with the cone: the path is the straight line between A and B in the
+    development, if that leaves the apex on its far side. Otherwise the string is free beyond the apex, or slips.
+    """
+    slope = node[k, DIM + 1]
+    cosine, sine = cone_angle(slope)
+    reach_a, reach_b = node[k, DIM] + slope * az, node[k, DIM] + slope * bz
+    rho_a, rho_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+    inside = (A_INSIDE if rho_a < INSIDE * reach_a else 0) + (B_INSIDE if rho_b < INSIDE * reach_b else 0)
+    alpha_a, root_a = _tangent_ruling(rho_a, reach_a)
+    alpha_b, root_b = _tangent_ruling(rho_b, reach_b)
+    principal = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+    sweep = _sweep(k, node, ax, ay, bx, by)
+    if _hinted(k, node):
+        hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
+        reach = max(reach_a, reach_b)
+        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, reach)
+    # along the ruling from the apex: m = reach (sine + cosine^2 / sine) = reach / sine on the surface and off it
+    along_a = max(reach_a, 0.0) / sine if root_a == 0.0 else reach_a / sine
+    along_b = max(reach_b, 0.0) / sine if root_b == 0.0 else reach_b / sine
+    delta_a, delta_b = math.atan2(root_a, along_a), math.atan2(root_b, along_b)
+    arc = abs(sweep) - alpha_a - alpha_b
+    if delta_a + arc * sine + delta_b >= math.pi and abs(sweep) > math.pi:
+        if node[k, S_MODE] != lay.COLD and abs(node[k, S_SWEEP]) > math.pi:
+            set_free(node, k, sweep)
+            return inside | SLIPPED
+        sweep = principal  # a free string that passes beyond the apex, or a hint that asks for what cannot be
+        arc = abs(sweep) - alpha_a - alpha_b
+    total = delta_a + arc * sine + delta_b
+    if arc <= CLEAR or total >= math.pi:
+        set_free(node, k, sweep)
+        return inside
+    turn = 1.0 if sweep >= 0.0 else -1.0
+    if root_a > 0.0:
+        nx, ny = _contact_normal(ax, ay, reach_a, root_a, turn)
+    else:
+        nx, ny = ax / max(rho_a, 1e-300), ay / max(rho_a, 1e-300)
+    far_a = math.sqrt(along_a * along_a + root_a * root_a)
+    far_b = math.sqrt(along_b * along_b + root_b * root_b)
+    # the straight line in the development, A at polar angle 0, P at delta_a, Q at delta_a + arc sine, B at `total`
+    lx, ly = far_b * math.cos(total) - far_a, far_b * math.sin(total)
+    size = math.sqrt(lx * lx + ly * ly)
+    lx, ly = lx / size, ly / size
+    height = far_a * ly  # distance of the line from the apex
+    cd, sd = math.cos(delta_a), math.sin(delta_a)
+    ce, se = math.cos(delta_a + arc * sine), math.sin(delta_a + arc * sine)
+    m = height / (ly * cd - lx * sd)
+    m_q = height / (ly * ce - lx * se)
+    along, around = lx * cd + ly * sd, turn * (ly * cd - lx * sd)
+    away = 1.0 if slope > 0.0 else -1.0
+    out = sine * along
+    node[k, S_MODE] = lay.TOUCHED
+    node[k, S_SWEEP] = sweep
+    node[k, S_P] = m * sine * nx
+    node[k, S_P + 1] = m * sine * ny
+    node[k, S_P + 2] = away * cosine * m - node[k, DIM] / slope
+    node[k, S_T] = out * nx - around * ny
+    node[k, S_T + 1] = out * ny + around * nx
+    node[k, S_T + 2] = away * cosine * along
+    node[k, S_ARC] = math.sqrt((m_q * ce - m * cd) ** 2 + (m_q * se - m * sd) ** 2)
+    return inside

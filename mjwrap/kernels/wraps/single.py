@@ -1,0 +1,139 @@
+"""Wraps of one obstacle between two given points: cold starts, touchdown and the test for it.
+
+Closed forms where there are any (`ruled.py`, and the sphere here: its shorter way is the only stable one), a search
+with Newton's
+method elsewhere (`search.py`). Every function takes the points A (before) and B (after) and writes the obstacle's row
+of
+`node`. It returns 0, plus A_INSIDE, plus B_INSIDE where the point lies inside the surface (it is then taken as on it),
+plus SLIPPED.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels.geometry.geodesics import geodesic
+from mjwrap.kernels.geometry.projection import height, into_frame, turn_into_frame
+from mjwrap.kernels.geometry.winding import tangents_sweep
+from mjwrap.kernels.wraps.ruled import (
+    A_INSIDE,
+    B_INSIDE,
+    CLEAR,
+    INSIDE,
+    set_free,
+    wrap_cone,
+    wrap_cylinder,
+    wrap_elliptic_cylinder,
+)
+from mjwrap.kernels.wraps.search import wrap_searched
+
+KIND, DIM, SIZE, POS, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.HINT
+S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
+
+
+# ------------------------------------------------------------------------------------------- sphere
+
+
+@jit
+def _plane_normal(ax, ay, az, bx, by, bz, k, node):
+    """Return the unit normal of the plane in which the string passes a sphere's centre.
+
+    Where A, centre and B are in line every plane is as good: the hint's is taken, else the last one, else any.
+    """
+    wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    size = math.sqrt(wx * wx + wy * wy + wz * wz)
+    scale = math.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
+    if size > 1e-13 * scale:
+        return wx / size, wy / size, wz / size
+    hx, hy, hz = 0.0, 0.0, 0.0
+    if node[k, HINT] > 0.0:
+        hx, hy, hz = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
+    elif node[k, S_MODE] == lay.TOUCHED:
+        hx, hy, hz = node[k, S_T], node[k, S_T + 1], node[k, S_T + 2]
+    wx, wy, wz = ay * hz - az * hy, az * hx - ax * hz, ax * hy - ay * hx
+    size = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if size <= 1e-9 * math.sqrt((ax * ax + ay * ay + az * az) * (hx * hx + hy * hy + hz * hz)):
+        if abs(ax) <= abs(ay) and abs(ax) <= abs(az):
+            wx, wy, wz = 0.0, az, -ay
+        elif abs(ay) <= abs(az):
+            wx, wy, wz = -az, 0.0, ax
+        else:
+            wx, wy, wz = ay, -ax, 0.0
+        size = max(math.sqrt(wx * wx + wy * wy + wz * wz), 1e-300)
+    return wx / size, wy / size, wz / size
+
+
+@jit
+def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
+    """Wrap a string from A to B over a sphere about the origin, the shorter way, in closed form."""
+    radius = node[k, DIM]
+    square_a, square_b, square = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, radius * radius
+    limit = INSIDE * INSIDE * square
+    inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
+    root_a = math.sqrt(max(square_a - square, 0.0))
+    root_b = math.sqrt(max(square_b - square, 0.0))
+    wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    sweep = math.atan2(math.sqrt(wx * wx + wy * wy + wz * wz), ax * bx + ay * by + az * bz)
+    arc = sweep - tangents_sweep(root_a, root_b, radius)
+    if arc <= CLEAR:
+        set_free(node, k, sweep)
+        return inside
+    wx, wy, wz = _plane_normal(ax, ay, az, bx, by, bz, k, node)
+    rho = max(math.sqrt(square_a), 1e-300)
+    ux, uy, uz = ax / rho, ay / rho, az / rho
+    vx, vy, vz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
+    c, d = min(radius / rho, 1.0), root_a / rho
+    node[k, S_MODE] = lay.TOUCHED
+    node[k, S_SWEEP] = sweep
+    node[k, S_P] = radius * (c * ux + d * vx)
+    node[k, S_P + 1] = radius * (c * uy + d * vy)
+    node[k, S_P + 2] = radius * (c * uz + d * vz)
+    node[k, S_T] = c * vx - d * ux
+    node[k, S_T + 1] = c * vy - d * uy
+    node[k, S_T + 2] = c * vz - d * uz
+    node[k, S_ARC] = radius * arc
+    return inside
+
+
+# ----------------------------------------------------------------------------------------- dispatch
+
+
+@jit
+def closed_form(kind):
+    """Return whether a surface's wrap is known in closed form."""
+    return kind <= lay.SPHERE or kind == lay.CONE or kind == lay.ELLIPTIC_CYLINDER
+
+
+@apart
+def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
+    """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
+
+    Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED
+    summed, or 0. search: look for another side where a contact is lost, on surfaces without a closed form.
+    """
+    kind = node[k, KIND]
+    if not closed_form(kind):
+        return wrap_searched(k, (base_x, base_y, base_z, ax, ay, az, bx, by, bz), node, search)
+    x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z
+    px, py, pz = turn_into_frame(node, k, ax - x, ay - y, az - z)
+    qx, qy, qz = turn_into_frame(node, k, bx - x, by - y, bz - z)
+    if kind == lay.CYLINDER:
+        inside = wrap_cylinder(k, px, py, pz, qx, qy, qz, node)
+    elif kind == lay.SPHERE:
+        inside = _wrap_sphere(k, px, py, pz, qx, qy, qz, node)
+    elif kind == lay.CONE:
+        inside = wrap_cone(k, px, py, pz, qx, qy, qz, node)
+    else:
+        inside = wrap_elliptic_cylinder(k, px, py, pz, qx, qy, qz, node)
+    if node[k, S_MODE] == lay.TOUCHED:
+        geodesic(k, node, base_x, base_y, base_z)
+    return inside
+
+
+@jit
+def holds(k, node, x, y, z):
+    """Return whether the point (x, y, z) of the world lies inside obstacle k."""
+    x, y, z = into_frame(node, k, x, y, z)
+    return height(node, k, x, y, z) < (INSIDE - 1.0) * node[k, SIZE]

@@ -1,0 +1,157 @@
+"""The flat arrays that the kernels read for all muscles of a model, built once from its declarations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.kernels import layout
+from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.musculotendon import dynamics, tension
+from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
+from mjwrap.muscles.laws import ActuatorForce
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Muscles, routes and nodes as the kernels in `mjwrap/kernels/coupling/muscle_paths.py` read them."""
+
+    n: int
+    node: Array  # (N, ROW), cold
+    links: Ints  # (N, 4)
+    routes: Ints  # (C, 8)
+    weights: Array  # (C,)
+    law: Ints  # (n,)
+    params: Array  # (n, PARAMS)
+    source: Ints  # (n,) where the state comes from
+    index: Ints  # (n,) in act
+    control: Ints  # (n,) in ctrl
+    ctrl_low: Array  # (n,)
+    ctrl_high: Array  # (n,)
+    form: Ints  # (n,) of the activation dynamics
+    times: Array  # (n, 5) constants of the activation dynamics
+    integrates: bool  # whether mjwrap integrates a state itself
+    output: (
+        Ints  # (n,) of the actuator whose length, velocity and moment mjwrap writes; -1 where wrenches act
+    )
+
+
+def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, int, float, float]:
+    """Return where a muscle's state comes from: source, index in act and in ctrl, limits of the control."""
+    if declared.actuator < 0:
+        direct = declared.parameters.states == 0
+        return (dynamics.DIRECT if direct else dynamics.OWN), 0, 0, -np.inf, np.inf
+    actuator = declared.actuator
+    if isinstance(declared.parameters, ActuatorForce) and not int(model.actuator_ctrlnum[actuator]):
+        return dynamics.DIRECT, 0, 0, -np.inf, np.inf
+    states, control = int(model.actuator_actadr[actuator]), int(model.actuator_ctrladr[actuator])
+    low, high = -np.inf, np.inf
+    if model.actuator_ctrllimited[control]:
+        low, high = (float(x) for x in model.actuator_ctrlrange[control])
+    if isinstance(declared.parameters, ActuatorForce):
+        kept, single = False, int(model.actuator_actnum[actuator]) > 0
+    else:
+        kept, single = keeps_state(model, actuator), int(model.actuator_actnum[actuator]) == 1
+    if kept:
+        return dynamics.KEPT, states, control, low, high
+    if single:
+        early = bool(model.actuator_actearly[actuator]) and not isinstance(declared.parameters, ActuatorForce)
+        return dynamics.EARLY if early else dynamics.FROM_ACT, states, control, low, high
+    return dynamics.FROM_CTRL, 0, control, low, high
+
+
+def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int) -> tuple[int, list[float]]:
+    """Return form and constants of a muscle's activation dynamics: mjwrap's, or the actuator's that acts early."""
+    if source != dynamics.EARLY:
+        return declared.activation.form, [*declared.activation.row(), 0.0, 0.0]
+    actuator = declared.actuator
+    low, high = -np.inf, np.inf
+    if model.actuator_actlimited[actuator]:
+        low, high = (float(x) for x in model.actuator_actrange[actuator])
+    constants = [float(x) for x in model.actuator_dynprm[actuator, :3]]
+    return EARLY_DYNAMICS[int(model.actuator_dyntype[actuator])], [*constants, low, high]
+
+
+def kernel_rows(node: Node) -> list[Array]:
+    """Return the kernels' rows of a stop, cold: one, or two for a surface that a string may touch twice."""
+    row = np.zeros(layout.ROW)
+    row[layout.S_MODE] = layout.COLD
+    if node.surface is None:
+        return [row]
+    dims = node.surface.dims
+    row[layout.KIND], row[layout.SIZE] = node.surface.kind, node.surface.size
+    row[layout.DIM : layout.DIM + len(dims)] = dims
+    row[layout.INSIDE] = float(node.inside)
+    if not node.surface.hollow:
+        return [row]
+    twin = row.copy()
+    twin[layout.TWIN] = 1.0
+    return [row, twin]
+
+
+def last_dofs(model: mujoco.MjModel) -> Ints:
+    """Return the last degree of freedom that moves each body (nbody,), -1 for those that stand still."""
+    last = np.full(model.nbody, -1, dtype=np.int64)
+    for body in range(1, model.nbody):
+        first, count = int(model.body_dofadr[body]), int(model.body_dofnum[body])
+        last[body] = first + count - 1 if count else last[model.body_parentid[body]]
+    return last
+
+
+def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
+    """Return the kernels' arrays for a list of muscles."""
+    links: list[tuple[int, int, int, int]] = []
+    rows: list[Array] = []
+    routes: list[tuple[int, ...]] = []
+    weights: list[float] = []
+    for m, declared in enumerate(muscles):
+        for route in declared.routes:
+            first = len(links)
+            for node in route.nodes:
+                found = kernel_rows(node)
+                on_geom = node.geom >= 0
+                body = int(model.geom_bodyid[node.geom] if on_geom else model.site_bodyid[node.site])
+                for k, row in enumerate(found):
+                    rows.append(row)
+                    links.append((node.site, node.geom, node.hint_site if k == 0 else -1, body))
+            bodies = int(model.site_bodyid[route.origin]), int(model.site_bodyid[route.insertion])
+            surfaces = sum(geom >= 0 for _, geom, _, _ in links[first:])
+            routes.append((first, len(links), route.origin, route.insertion, *bodies, m, surfaces))
+            weights.append(route.weight)
+    n = len(muscles)
+    params = np.zeros((n, tension.PARAMS))
+    outputs = [
+        int(model.actuator_outadr[m.actuator]) if isinstance(m.parameters, ActuatorForce) else -1
+        for m in muscles
+    ]
+    sources = [_source(model, declared) for declared in muscles]
+    activations = [
+        _activation(model, declared, source[0]) for declared, source in zip(muscles, sources, strict=True)
+    ]
+    for m, declared in enumerate(muscles):
+        values = declared.parameters.row()
+        params[m, : len(values)] = values
+    return Plan(
+        n=n,
+        node=np.array(rows).reshape(-1, layout.ROW),
+        links=np.array(links, dtype=np.int64).reshape(-1, 4),
+        routes=np.array(routes, dtype=np.int64).reshape(-1, muscle_paths.ROUTE),
+        weights=np.array(weights, dtype=np.float64),
+        law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
+        params=params,
+        source=np.array([s[0] for s in sources], dtype=np.int64),
+        index=np.array([s[1] for s in sources], dtype=np.int64),
+        control=np.array([s[2] for s in sources], dtype=np.int64),
+        ctrl_low=np.array([s[3] for s in sources], dtype=np.float64),
+        ctrl_high=np.array([s[4] for s in sources], dtype=np.float64),
+        form=np.array([form for form, _ in activations], dtype=np.int64),
+        times=np.array([row for _, row in activations], dtype=np.float64).reshape(-1, dynamics.TIMES),
+        output=np.array(outputs, dtype=np.int64),
+        integrates=any(s[0] in (dynamics.OWN, dynamics.KEPT) for s in sources),
+    )

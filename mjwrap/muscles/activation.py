@@ -1,0 +1,56 @@
+"""Constants of the activation dynamics; the rates are in `mjwrap/kernels/musculotendon/activation_dynamics.py`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mjwrap.errors import ModelError
+from mjwrap.kernels.musculotendon import activation_dynamics
+
+FORMS = {"zajac": activation_dynamics.ZAJAC, "degroote_fregly_2016": activation_dynamics.SMOOTH}
+TIMES = {"zajac": (0.010, 0.040), "degroote_fregly_2016": (0.015, 0.060)}  # [s], activation and deactivation
+
+
+@dataclass(frozen=True)
+class ActivationDynamics:
+    """First-order dynamics from excitation to activation, both held in [0, 1].
+
+    dynamics: "zajac", MuJoCo's and OpenSim's two-rate form (doi 10.1115/1.4023390), or "degroote_fregly_2016", smooth
+    in the excitation (doi 10.1007/s10439-016-1591-9). activation_time, deactivation_time [s] > 0; None: 0.010 and 0.040
+    for the former, 0.015 and 0.060 for the latter. smoothing > 0: the latter's b, larger is sharper. `ModelError`
+    otherwise.
+    """
+
+    dynamics: str = "zajac"
+    activation_time: float | None = None
+    deactivation_time: float | None = None
+    smoothing: float = 10.0
+
+    def __post_init__(self) -> None:
+        if self.dynamics not in FORMS:
+            raise ModelError(
+                f"activation dynamics '{self.dynamics}' do not exist; there are: {', '.join(FORMS)}"
+            )
+        values = {
+            "activation_time": self.activation_time,
+            "deactivation_time": self.deactivation_time,
+            "smoothing": self.smoothing,
+        }
+        for name, value in values.items():
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ModelError(f"{name} must be finite and positive, not {value!r}")
+
+    @property
+    def form(self) -> int:
+        """Code of the dynamics in the kernels."""
+        return FORMS[self.dynamics]
+
+    def row(self) -> tuple[float, float, float]:
+        """Return time constants [s] and smoothness as the kernels read them."""
+        up, down = TIMES[self.dynamics]
+        return (
+            up if self.activation_time is None else self.activation_time,
+            down if self.deactivation_time is None else self.deactivation_time,
+            self.smoothing,
+        )

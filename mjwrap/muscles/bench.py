@@ -1,0 +1,106 @@
+"""One muscle alone, along a prescribed length: what a physiologist does to it on the bench."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjwrap.errors import StateError
+from mjwrap.kernels.musculotendon import dynamics as kernels
+from mjwrap.kernels.musculotendon.tension import PARAMS
+from mjwrap.muscles.activation import ActivationDynamics
+from mjwrap.muscles.laws import Law
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MuscleTrial:
+    """A muscle's history, (T,) each: time [s], length and fiber_length [m], activation [-], tension [N].
+
+    iterations: evaluations of the balance of fibre and tendon, 0 with a rigid tendon; status: codes of
+    `mjwrap/kernels/musculotendon/fiber.py` (0 normal, 1 at the minimum fibre length, 2 slack tendon, 3 not converged).
+    """
+
+    time: Array
+    length: Array
+    activation: Array
+    fiber_length: Array
+    tension: Array
+    iterations: NDArray[np.int64]
+    status: NDArray[np.int64]
+
+
+def simulate_muscle(
+    law: Law,
+    time: ArrayLike,
+    length: ArrayLike,
+    *,
+    excitation: ArrayLike | None = None,
+    activation: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    initial_activation: float = 0.0,
+    initial_fiber_length: float | None = None,
+    dynamics: ActivationDynamics | None = None,
+) -> MuscleTrial:
+    """Simulate one muscle whose musculotendon length is prescribed, by the same steps as a `MuscleSystem` takes.
+
+    time (T,): increasing [s]; length: (T,) or one number [m]; either excitation, held from each time to the next, with
+    `dynamics` and `initial_activation`, or activation, (T,) or one number each. velocity (T,) [m/s]: lengthening speed;
+    None: central differences of length. An elastic tendon takes one implicit step from each time to
+    the next, from initial_fiber_length [m], or from static equilibrium. `StateError` for arrays that do
+    not fit, and for numbers that are not finite or not in their range.
+    """
+    t = np.array(time, dtype=np.float64)
+    if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
+        raise StateError("time must be a list of finite, increasing numbers [s]")
+    if (excitation is None) == (activation is None):
+        raise StateError("give either an excitation or an activation")
+    lengths = _column("length", length, t.size)
+    if not (lengths > 0.0).all():
+        raise StateError("length must be positive [m]")
+    if not 0.0 <= initial_activation <= 1.0:
+        raise StateError(f"initial_activation must be in [0, 1], not {initial_activation!r}")
+    if initial_fiber_length is not None and not (0.0 < initial_fiber_length < math.inf):
+        raise StateError(f"initial_fiber_length must be positive [m], not {initial_fiber_length!r}")
+    drive = _column(
+        "excitation" if activation is None else "activation", _either(excitation, activation), t.size
+    )
+    speeds = _rates(lengths, t) if velocity is None else _column("velocity", velocity, t.size)
+    states, fibers, tension = np.zeros((3, t.size))
+    states[0] = initial_activation
+    fibers[0] = kernels.NO_FIBER if initial_fiber_length is None else initial_fiber_length
+    counts = np.zeros((t.size, 2), dtype=np.int64)
+    params = np.zeros((1, PARAMS))
+    row = law.row()
+    params[0, : len(row)] = row
+    chosen = dynamics or ActivationDynamics()
+    kernels.simulate(
+        law.code, params, chosen.form, np.array(chosen.row()), t, lengths, speeds, drive, _rates(drive, t),
+        activation is not None, states, fibers, tension, counts,
+    )  # fmt: skip
+    return MuscleTrial(t, lengths, states, fibers, tension, counts[:, 0], counts[:, 1])
+
+
+def _either(first: ArrayLike | None, second: ArrayLike | None) -> ArrayLike:
+    return second if first is None and second is not None else first if first is not None else 0.0
+
+
+def _column(name: str, values: ArrayLike, size: int) -> Array:
+    """Return a number or (T,) as an array (T,), finite."""
+    given = np.asarray(values, dtype=np.float64)
+    if given.shape not in ((), (size,)):
+        raise StateError(f"{name} must be one number or have shape ({size},) like time, not {given.shape}")
+    if not np.isfinite(given).all():
+        raise StateError(f"{name} is not finite")
+    return np.ascontiguousarray(np.broadcast_to(given, (size,)))
+
+
+def _rates(values: Array, time: Array) -> Array:
+    """Return central differences (T,) of a history, one-sided at its ends."""
+    if time.size == 1:
+        return np.zeros(1)
+    return np.gradient(values, time, edge_order=2 if time.size > 2 else 1)

@@ -1,0 +1,177 @@
+"""Energy of muscles: powers of fibres and tendons, what their springs hold, and what the work costs in metabolism.
+
+The equations are in `mjwrap/kernels/musculotendon/power.py` and `mjwrap/kernels/musculotendon/umberger.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import ModelError
+from mjwrap.kernels.musculotendon import power as kernel
+from mjwrap.kernels.musculotendon import tension, umberger
+from mjwrap.kernels.musculotendon.fiber import F_MAX, OPTIMAL
+
+Vector = NDArray[np.float64]
+FIBERS = (tension.DEGROOTE_FREGLY, tension.MILLARD)
+
+
+@dataclass(frozen=True)
+class Umberger2010:
+    """Metabolic constants of a muscle, with OpenSim's defaults (its `Umberger2010MuscleMetabolicsProbe`).
+
+    - slow_twitch_ratio of the fibres, 0..1
+    - specific_tension [Pa] and density [kg/m^3] give the muscle's mass, max_isometric_force / specific_tension
+      * density * optimal_fiber_length, unless mass [kg] does
+    - aerobic_factor: 1.5 for primarily aerobic activities, 1.0 for others
+    - minimum_heat_rate [W/kg], 0 for none
+    - effort scales excitation, activation and active force, where the muscles of a model work against each other more
+      than a person's do
+    - recruitment: slow-twitch fibres are recruited first, and the ratio holds at full excitation (Bhargava et al. 2004,
+      doi 10.1016/S0021-9290(03)00239-2)
+    - negative_work: lengthening counts as negative work and gives more heat (Umberger et al. 2003,
+      doi 10.1080/1025584031000091678)
+    - forbid_negative_power: more heat where a muscle would win energy
+
+    With the last three False it is the model as published in 2010 (doi 10.1098/rsif.2010.0084). `ModelError` where a
+    number is not finite, or not in its range.
+    """
+
+    slow_twitch_ratio: float = 0.5
+    specific_tension: float = 0.25e6
+    density: float = 1059.7
+    mass: float | None = None
+    aerobic_factor: float = 1.5
+    minimum_heat_rate: float = 1.0
+    effort: float = 1.0
+    recruitment: bool = True
+    negative_work: bool = True
+    forbid_negative_power: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.slow_twitch_ratio <= 1.0:
+            raise ModelError(
+                f"Umberger2010: slow_twitch_ratio must be in [0, 1], not {self.slow_twitch_ratio!r}"
+            )
+        for name in ("specific_tension", "density", "mass"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ModelError(f"Umberger2010: {name} must be finite and positive, not {value!r}")
+        for name in ("aerobic_factor", "minimum_heat_rate", "effort"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ModelError(f"Umberger2010: {name} must be finite and >= 0, not {value!r}")
+
+    def muscle_mass(self, max_isometric_force: float, optimal_fiber_length: float) -> float:
+        """Return the mass of a muscle [kg] of a given force [N] and fibre length [m]."""
+        if self.mass is not None:
+            return self.mass
+        return max_isometric_force / self.specific_tension * self.density * optimal_fiber_length
+
+    def row(self, max_isometric_force: float, optimal_fiber_length: float) -> tuple[float, ...]:
+        """Return the constants in the order of the kernel's columns."""
+        return (
+            self.muscle_mass(max_isometric_force, optimal_fiber_length),
+            self.slow_twitch_ratio,
+            self.aerobic_factor,
+            self.minimum_heat_rate,
+            self.effort,
+            float(self.recruitment),
+            float(self.negative_work),
+            float(self.forbid_negative_power),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Energetics:
+    """Energies and powers of n muscles at one instant, each array (n,); power is positive where it is delivered.
+
+    A fibre or tendon that shortens under tension delivers power, one that is stretched takes it up. Muscles without
+    fibres (MuJoCo's, the path actuator) have `muscle_power` only, the rest is zero. `tendon_power` and `tendon_energy`
+    are zero with a rigid tendon; heats, work and `metabolic_power` where no `Umberger2010` was given.
+
+    - fiber_velocity [m/s]: lengthening positive
+    - active_power, passive_power, damping_power [W]: of the cross-bridges, of the parallel elastic element, and of the
+      damping, which is never positive; fiber_power is their sum
+    - tendon_power [W]: minus the rate of tendon_energy
+    - muscle_power [W]: minus tension times lengthening speed, what reaches the skeleton; the sum of fiber_power,
+      tendon_power and unbalanced_power
+    - unbalanced_power [W]: zero but where a law clamps: a fibre that pushes on a rigid tendon, or an undamped one
+      beyond the range of its force-velocity curve
+    - tendon_energy, fiber_energy [J]: held by the tendon and by the parallel elastic element, zero without strain
+    - activation_heat, maintenance_heat [W]: together the heat of a muscle that is active at constant length
+    - shortening_heat [W]: of shortening or lengthening, with what `forbid_negative_power` adds
+    - resting_heat [W]: what lifts the three to `minimum_heat_rate`
+    - mechanical_work [W]: what the metabolic model counts of active_power
+    - metabolic_power [W]: the four heats and the work; without the basal rate of the body (`basal_power`)
+    """
+
+    fiber_velocity: Vector
+    active_power: Vector
+    passive_power: Vector
+    damping_power: Vector
+    fiber_power: Vector
+    tendon_power: Vector
+    muscle_power: Vector
+    unbalanced_power: Vector
+    tendon_energy: Vector
+    fiber_energy: Vector
+    activation_heat: Vector
+    maintenance_heat: Vector
+    shortening_heat: Vector
+    resting_heat: Vector
+    mechanical_work: Vector
+    metabolic_power: Vector
+
+
+def metabolic_constants(
+    model: Umberger2010 | Sequence[Umberger2010 | None] | None, law: NDArray[np.int64], params: Vector
+) -> Vector:
+    """Return the metabolic constants (n, 8) of muscles with laws (n,) and parameters (n, PARAMS).
+
+    model: one for all muscles, one each, or None for no metabolism. `ModelError` where they are not as many as muscles.
+    """
+    models = [model] * len(law) if model is None or isinstance(model, Umberger2010) else list(model)
+    if len(models) != len(law):
+        raise ModelError(
+            f"{len(models)} metabolic models were given for {len(law)} muscles: give one, or one each"
+        )
+    constants = np.zeros((len(law), umberger.CONSTANTS))
+    for m, each in enumerate(models):
+        if each is not None and law[m] in FIBERS:
+            constants[m] = each.row(params[m, F_MAX], params[m, OPTIMAL])
+    return constants
+
+
+def compute_energetics(
+    law: NDArray[np.int64],
+    params: Vector,
+    activation: Vector,
+    excitation: Vector,
+    length: Vector,
+    velocity: Vector,
+    fiber_length: Vector,
+    constants: Vector,
+) -> Energetics:
+    """Return the energetics of n muscles, in one compiled loop.
+
+    law (n,) and params (n, PARAMS) as in the kernels; activation, excitation (n,) 0..1; length (n,) [m] and velocity
+    (n,) [m/s] of the units, lengthening positive; fiber_length (n,) [m], read with an elastic tendon only; constants
+    (n, 8) of `metabolic_constants`.
+    """
+    out = np.empty((kernel.OUTPUTS, len(law)))
+    kernel.energetics(law, params, activation, excitation, length, velocity, fiber_length, constants, out)
+    return Energetics(*out)
+
+
+def basal_power(body_mass: float, coefficient: float = 1.2, exponent: float = 1.0) -> float:
+    """Return the basal metabolic power of a body [W] from its mass [kg]; 1.2 W/kg: standing (Umberger et al. 2003)."""
+    return coefficient * body_mass**exponent
+
+
+assert len(fields(Energetics)) == kernel.OUTPUTS

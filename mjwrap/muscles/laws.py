@@ -1,0 +1,281 @@
+"""Musculotendon parameters: one frozen, validated dataclass per law; forces: `mjwrap/kernels/musculotendon/tension.py`.
+
+A law fills one row of the kernels' parameter table. To add one: a section here, a section and a row there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from mjwrap.errors import ModelError
+from mjwrap.kernels.musculotendon import degroote_fregly, millard, tension
+from mjwrap.kernels.musculotendon.mujoco_muscle import MINVAL
+
+TENDONS = ("rigid", "elastic")
+# Below this [l_o] an elastic tendon is rigid: at maximum isometric force it would stretch by 5e-6 l_o, which changes
+# a fibre's force by about 1e-5 of that, while its stiffness grows without bound.
+SHORTEST_TENDON = 1e-4
+LEAST_COSINE = 0.1  # of the pennation angle, at the shortest fibre length (Millard et al. 2013)
+
+
+class Law(Protocol):
+    """What the solver needs of a muscle law: its code, its name and its row of parameters."""
+
+    code: ClassVar[int]
+    law: ClassVar[str]
+
+    @property
+    def states(self) -> int:
+        """Return how many states the law has of activation and fibre length, in this order: 0, 1 or 2."""
+        ...
+
+    @property
+    def strength(self) -> float:
+        """Return the tension [N] that it has fully active, at rest and at its best length, without the passive part."""
+        ...
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameters in the order of the kernel's section."""
+        ...
+
+
+def _require(law: Law, good: bool, name: str, value: float, wanted: str) -> None:
+    if not good:
+        raise ModelError(f"{law.law}: {name} must be {wanted}, not {value!r}")
+
+
+def _positive(law: Law, **values: float) -> None:
+    for name, value in values.items():
+        _require(law, math.isfinite(value) and value > 0.0, name, value, "finite and positive")
+
+
+def _check_fiber(law: DeGrooteFregly2016 | Millard2012) -> None:
+    """Raise `ModelError` where a law with a fibre has sizes without sense."""
+    _positive(
+        law,
+        max_isometric_force=law.max_isometric_force,
+        optimal_fiber_length=law.optimal_fiber_length,
+        max_contraction_velocity=law.max_contraction_velocity,
+    )
+    slack, angle, damping = law.tendon_slack_length, law.pennation_angle, law.damping
+    _require(law, math.isfinite(slack) and slack >= 0.0, "tendon_slack_length", slack, "finite and >= 0 [m]")
+    _require(law, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
+    _require(law, math.isfinite(damping) and damping >= 0.0, "fiber_damping", damping, "finite and >= 0")
+    if law.tendon not in TENDONS:
+        raise ModelError(f"{law.law}: tendon must be one of {', '.join(TENDONS)}, not {law.tendon!r}")
+
+
+def _is_elastic(law: DeGrooteFregly2016 | Millard2012) -> bool:
+    return law.tendon == "elastic" and law.tendon_slack_length >= SHORTEST_TENDON * law.optimal_fiber_length
+
+
+def _fiber_row(law: DeGrooteFregly2016 | Millard2012, least: float) -> tuple[float, ...]:
+    """Return the columns of `kernels/musculotendon/fiber.py`; least: shortest fibre of the law's curves [l_o]."""
+    height = law.optimal_fiber_length * math.sin(law.pennation_angle)
+    return (
+        law.max_isometric_force,
+        law.optimal_fiber_length,
+        law.tendon_slack_length,
+        law.pennation_angle,
+        law.max_contraction_velocity,
+        law.damping,
+        float(_is_elastic(law)),
+        height,
+        max(least * law.optimal_fiber_length, height / math.sqrt(1.0 - LEAST_COSINE**2)),
+    )
+
+
+@dataclass(frozen=True)
+class DeGrooteFregly2016:
+    """The muscle of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9) with pennation, rigid or elastic tendon.
+
+    max_isometric_force [N], optimal_fiber_length [m] > 0; tendon_slack_length [m] >= 0; pennation_angle at optimal
+    fibre length [rad] in [0, pi/2); max_contraction_velocity [optimal lengths/s]; fiber_damping >= 0 [max isometric
+    forces per max contraction velocity], where not given 0 with a rigid tendon and 0.1 with an elastic one, whose fibre
+    then has one velocity at every activation; tendon "rigid" or "elastic", rigid in any case where it is shorter than
+    1e-4 optimal fibre lengths. `ModelError` otherwise.
+    """
+
+    max_isometric_force: float
+    optimal_fiber_length: float
+    tendon_slack_length: float
+    pennation_angle: float = 0.0
+    max_contraction_velocity: float = 10.0
+    fiber_damping: float | None = None
+    tendon: str = "rigid"
+    code: ClassVar[int] = tension.DEGROOTE_FREGLY
+    law: ClassVar[str] = "degroote_fregly_2016"
+
+    def __post_init__(self) -> None:
+        _check_fiber(self)
+
+    @property
+    def damping(self) -> float:
+        """Return the fibre damping in use, given or by default."""
+        if self.fiber_damping is not None:
+            return self.fiber_damping
+        return 0.1 if self.tendon == "elastic" else 0.0
+
+    @property
+    def states(self) -> int:
+        """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
+        return 2 if _is_elastic(self) else 1
+
+    @property
+    def strength(self) -> float:
+        """Return the maximum isometric force along the tendon [N]."""
+        return self.max_isometric_force * math.cos(self.pennation_angle)
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameters in the order of `mjwrap/kernels/musculotendon/fiber.py`."""
+        return _fiber_row(self, degroote_fregly.LEAST)
+
+
+@dataclass(frozen=True)
+class Millard2012:
+    """The damped muscle of Millard et al. 2013 (doi 10.1115/1.4023390, OpenSim's Millard2012EquilibriumMuscle).
+
+    Sizes, tendon and `ModelError` as for `DeGrooteFregly2016`; fiber_damping is 0.1 with either tendon. Curves have
+    OpenSim's default shapes.
+    """
+
+    max_isometric_force: float
+    optimal_fiber_length: float
+    tendon_slack_length: float
+    pennation_angle: float = 0.0
+    max_contraction_velocity: float = 10.0
+    fiber_damping: float = 0.1
+    tendon: str = "rigid"
+    code: ClassVar[int] = tension.MILLARD
+    law: ClassVar[str] = "millard_2012"
+
+    def __post_init__(self) -> None:
+        _check_fiber(self)
+
+    @property
+    def damping(self) -> float:
+        """Return the fibre damping in use."""
+        return self.fiber_damping
+
+    @property
+    def states(self) -> int:
+        """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
+        return 2 if _is_elastic(self) else 1
+
+    @property
+    def strength(self) -> float:
+        """Return the maximum isometric force along the tendon [N]."""
+        return self.max_isometric_force * math.cos(self.pennation_angle)
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameters in the order of `mjwrap/kernels/musculotendon/fiber.py`."""
+        return _fiber_row(self, millard.LEAST)
+
+
+_PRM = ("range[0]", "range[1]", "force", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax")
+
+
+@dataclass(frozen=True)
+class MuJoCoMuscle:
+    """MuJoCo's own `<muscle>` curves, so that a native model can be compared like for like.
+
+    prm (9,): range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`; length_range (2,)
+    of the actuator [m times gear]; acc0; gear; force_range (2,) [N]; passive (9,): those of the passive force, as in
+    `actuator_biasprm`, where it has its own. `ModelError` where the curves are undefined.
+    """
+
+    prm: tuple[float, ...]
+    length_range: tuple[float, float]
+    acc0: float
+    gear: float = 1.0
+    force_range: tuple[float, float] = (-math.inf, math.inf)
+    passive: tuple[float, ...] | None = None
+    code: ClassVar[int] = tension.MUJOCO
+    law: ClassVar[str] = "mujoco"
+
+    def __post_init__(self) -> None:
+        for what, prm in (("", self.prm), ("passive ", self.passive or self.prm)):
+            _require(self, len(prm) == 9, f"{what}prm", len(prm), "nine numbers")
+            for name, value in zip(_PRM, prm, strict=True):
+                _require(self, math.isfinite(value), what + name, value, "finite")
+            _require(self, prm[1] > prm[0], f"{what}range", prm[1], f"above {prm[0]}")
+            _require(self, prm[5] > 0.0, f"{what}lmax", prm[5], "finite and positive")
+        _require(self, math.isfinite(self.acc0), "acc0", self.acc0, "finite")
+        _require(self, math.isfinite(self.gear) and self.gear > 0.0, "gear", self.gear, "finite and positive")
+        low, high = self.length_range
+        _require(
+            self, high > low, "length range", low - high, "increasing: optimal fibre length is zero otherwise"
+        )
+        _positive(self, vmax=self.prm[6])
+        least, most = self.force_range
+        _require(self, least <= most, "force range", least, f"at most {most}")
+
+    @property
+    def states(self) -> int:
+        """Return 1: activation."""
+        return 1
+
+    @property
+    def strength(self) -> float:
+        """Return the peak active force [N], along the path: MuJoCo's `force`, or `scale / acc0`, times gear."""
+        force, scale = self.prm[2:4]
+        return self.gear * (force if force >= 0.0 else scale / max(MINVAL, self.acc0))
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameters in the order of `mjwrap/kernels/musculotendon/mujoco_muscle.py`."""
+        range0, range1, force, scale, _, lmax, _, fpmax, _ = self.passive or self.prm
+        passive = (range0, range1, force, scale, lmax, fpmax)
+        return (*self.prm, *self.length_range, self.acc0, self.gear, *self.force_range, *passive)
+
+
+@dataclass(frozen=True)
+class ActuatorForce:
+    """The force that MuJoCo computes for an actuator of any kind, whose path is mjwrap's; no tension here."""
+
+    code: ClassVar[int] = tension.PATH_ACTUATOR
+    law: ClassVar[str] = "mujoco"
+
+    @property
+    def states(self) -> int:
+        """Return 0: its states are MuJoCo's."""
+        return 0
+
+    @property
+    def strength(self) -> float:
+        """Return infinity: only MuJoCo knows how hard its actuator pulls."""
+        return math.inf
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameter of `path_actuator` in `mjwrap/kernels/musculotendon/tension.py`: no force."""
+        return (0.0,)
+
+
+@dataclass(frozen=True)
+class PathActuator:
+    """Tension = activation x optimal force, without any dynamics (OpenSim's PathActuator, tension only).
+
+    optimal_force [N], finite and positive, else `ModelError`.
+    """
+
+    optimal_force: float
+    code: ClassVar[int] = tension.PATH_ACTUATOR
+    law: ClassVar[str] = "path_actuator"
+
+    def __post_init__(self) -> None:
+        _positive(self, optimal_force=self.optimal_force)
+
+    @property
+    def states(self) -> int:
+        """Return 0: its activation is the excitation."""
+        return 0
+
+    @property
+    def strength(self) -> float:
+        """Return the optimal force [N]."""
+        return self.optimal_force
+
+    def row(self) -> tuple[float, ...]:
+        """Return the parameter of `path_actuator` in `mjwrap/kernels/musculotendon/tension.py`."""
+        return (self.optimal_force,)

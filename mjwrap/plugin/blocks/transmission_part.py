@@ -1,0 +1,118 @@
+"""What an instance of the plugin needs to give actuators length, velocity and moment, written from a compiled model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import ModelError
+from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.mjcf import MuscleDeclaration, name_of
+from mjwrap.model.arrays import Plan, last_dofs
+from mjwrap.plugin.callbacks import transmission as tr
+from mjwrap.plugin.mujoco_c.offsets import offsets
+from mjwrap.plugin.spec.placeholders import is_measured_late, shown_tendons
+
+Ints = NDArray[np.int64]
+OBJ = mujoco.mjtObj
+
+
+def _moved_by(model: mujoco.MjModel, last: Ints, body: int) -> set[int]:
+    """Return the dofs that move a body."""
+    dofs, dof = set(), int(last[body])
+    while dof >= 0:
+        dofs.add(dof)
+        dof = int(model.dof_parentid[dof])
+    return dofs
+
+
+def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
+    """Return the dofs for which MuJoCo keeps room in the moment of an actuator: those that its tendon's bodies have."""
+    tendon = int(model.actuator_trnid[actuator, 0])
+    first = int(model.ten_J_rowadr[tendon])
+    return {int(dof) for dof in model.ten_J_colind[first : first + int(model.ten_J_rownnz[tendon])]}
+
+
+def check_room(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> None:
+    """Raise `ModelError` for a muscle whose path changes with a dof for which its actuator's moment has no room."""
+    last = last_dofs(model)
+    for route in plan.routes:
+        muscle = muscles[int(route[muscle_paths.R_MUSCLE])]
+        if plan.output[route[muscle_paths.R_MUSCLE]] < 0:
+            continue
+        stops = plan.links[route[muscle_paths.R_LO] : route[muscle_paths.R_HI], muscle_paths.L_BODY].tolist()
+        bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
+        moved = {body: _moved_by(model, last, body) for body in bodies}
+        room = _columns(model, muscle.actuator) | set.intersection(*moved.values())
+        for body, dofs in moved.items():
+            if not dofs <= room:
+                tendon = name_of(model, OBJ.mjOBJ_TENDON, int(model.actuator_trnid[muscle.actuator, 0]))
+                raise ModelError(
+                    f"muscle '{muscle.name}': its path runs over body '{name_of(model, OBJ.mjOBJ_BODY, body)}', which "
+                    f"tendon '{tendon}' does not touch, so MuJoCo keeps no room for its moment there; let the tendon "
+                    f"pass a site on that body, or use mode 'wrench'"
+                )
+
+
+def _sensors(model: mujoco.MjModel, plan: Plan, tendons: Ints) -> list[tuple[int, int, int, float]]:
+    """Return index in sensordata, muscle, whether it is an actuator's, and cutoff [m] of the sensors of lengths."""
+    kinds = mujoco.mjtSensor
+    by_output = {int(out): m for m, out in enumerate(plan.output) if out >= 0}
+    by_tendon = {int(tendon): m for m, tendon in enumerate(tendons) if tendon >= 0}
+    found: list[tuple[int, int, int, float]] = []
+    for i in range(model.nsensor):
+        kind, item = int(model.sensor_type[i]), int(model.sensor_objid[i])
+        if is_measured_late(model, i):
+            continue
+        muscle = None
+        if kind == int(kinds.mjSENS_ACTUATORPOS):
+            muscle = by_output.get(int(model.actuator_outadr[item]))
+        elif kind == int(kinds.mjSENS_TENDONPOS):
+            muscle = by_tendon.get(item)
+        if muscle is not None:
+            cutoff = float(model.sensor_cutoff[i])
+            limit = cutoff if cutoff > 0.0 else np.inf
+            found.append(
+                (int(model.sensor_adr[i]), muscle, int(kind == int(kinds.mjSENS_ACTUATORPOS)), limit)
+            )
+    return found
+
+
+def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> Ints:
+    """Return the part of the block that `callbacks/transmission.py` reads, as words."""
+    head = np.zeros(tr.HEAD, dtype=np.int64)
+    head[tr.COUNT] = np.count_nonzero(plan.output >= 0)
+    if not head[tr.COUNT]:
+        return head
+    check_room(model, plan, muscles)
+    shown = shown_tendons(model, muscles)
+    pulled = [int(model.actuator_trnid[m.actuator, 0]) if m.actuator >= 0 else -1 for m in muscles]
+    tendons = np.array(
+        [t if out >= 0 and t in shown else -1 for t, out in zip(pulled, plan.output, strict=True)],
+        dtype=np.int64,
+    )
+    sensors = _sensors(model, plan, tendons)
+    head[tr.DOFS], head[tr.OUTPUTS], head[tr.MOMENTS] = model.nv, model.nout, model.nJmom
+    head[tr.TENDONS], head[tr.TENDON_MOMENTS] = model.ntendon, model.nJten
+    head[tr.SENSORS], head[tr.SENSOR_NUMBERS] = len(sensors), model.nsensordata
+    head[tr.NO_SENSORS] = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    fields = offsets().data | offsets().model
+    head[tr.CDOF : tr.CDOF + len(tr.FIELDS)] = [fields[name] for name in tr.FIELDS]
+    arrays: dict[str, Any] = {
+        "output": plan.output,
+        "tendon": tendons,
+        "tendon_row": np.where(tendons >= 0, model.ten_J_rowadr[tendons], 0).astype(np.int64),
+        "last_dof": last_dofs(model),
+        "dof_parentid": np.array(model.dof_parentid, dtype=np.int64),
+        "row": np.zeros(model.nv),
+        "sensor": np.array([s[:3] for s in sensors], dtype=np.int64),
+        "limits": np.array([(-s[3], s[3]) for s in sensors]),
+    }
+    pieces = [head]
+    for place, name in enumerate(tr.ARRAYS, start=tr.A_OUTPUT):
+        head[place] = 8 * sum(len(piece) for piece in pieces)
+        pieces.append(np.ascontiguousarray(arrays[name]).ravel().view(np.int64))
+    return np.concatenate(pieces)

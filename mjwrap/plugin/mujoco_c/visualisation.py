@@ -1,0 +1,235 @@
+"""Where the fields of MuJoCo's visualisation structs lie, found and verified as in `offsets.py`.
+
+The Python bindings do not tell where a scene or its geoms are, so MuJoCo's own functions fill structs in memory of
+ours, and what is read there is compared with what the bindings show of the same scene.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import warnings
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import VersionError
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks.drawing import GROUPS, LABEL
+from mjwrap.plugin.mujoco_c.library import library
+from mjwrap.plugin.mujoco_c.offsets import check_pointer, extent, refuse, structs, walk
+
+_ARRAYS = (
+    "tendon_width", "tendon_rgba", "tendon_group", "tendon_matid", "actuator_group",
+    "mat_rgba", "mat_emission", "mat_specular", "mat_shininess", "mat_reflectance",
+)  # fmt: skip
+_GEOM_NUMBERS = (
+    "type",
+    "objtype",
+    "objid",
+    "category",
+    "segid",
+    "emission",
+    "specular",
+    "shininess",
+    "reflectance",
+)
+_GEOM_ARRAYS = ("size", "pos", "mat", "rgba")
+_SPARE = 64  # bytes behind a struct that MuJoCo must not touch
+_TEXT = b"The scene is full and muscles are missing in it; increase maxgeom."
+_XML = """
+<mujoco>
+  <visual>
+    <map alpha="0.375" actuatortendon="1.625"/>
+    <rgba actuator="0.1 0.2 0.3 0.4" actuatorpositive="0.5 0.6 0.7 0.8" contactpoint="0.9 0.25 0.35 0.45"
+      actuatornegative="0.55 0.65 0.75 0.85"/>
+  </visual>
+  <asset>
+    <material name="dull" rgba="0.2 0.4 0.6 0.8" emission="0.125" specular="0.25" shininess="0.375"
+      reflectance="0.625"/>
+    <material name="red" rgba="0.9 0.1 0.1 1"/>
+  </asset>
+  <worldbody>
+    <geom size="0.1" material="dull"/>
+    <body pos="0 0 1"><freejoint/><geom type="capsule" size="0.1 0.2" euler="10 20 30" rgba="0.1 0.6 0.3 0.9"/></body>
+    <site name="a" pos="0 1 0"/><site name="b" pos="0.3 1 0.7"/><site name="c" pos="0.1 1.5 0.2"/>
+  </worldbody>
+  <tendon>
+    <spatial name="first" width="0.02" material="red"><site site="a"/><site site="b"/></spatial>
+    <spatial name="second" group="1" rgba="0.3 0.2 0.1 0.5"><site site="b"/><site site="c"/></spatial>
+  </tendon>
+  <actuator><motor tendon="first"/><motor tendon="second" group="3"/></actuator>
+</mujoco>
+"""
+
+
+class Drawing(NamedTuple):
+    """What the head of a block says about drawing, as `block.DRAWING` lists it; `blank`: a geom as MuJoCo begins it."""
+
+    words: list[int]
+    blank: bytes
+
+
+def _fields(name: str) -> tuple[dict[str, int], int]:
+    """Return the offset of every field of a struct, and its size."""
+    offsets, size, _ = walk(structs()[name].fields)
+    return offsets, size
+
+
+def _visual() -> dict[str, int]:
+    """Return the offsets in mjModel of what `block.DRAWING` names of its visual options."""
+    start, found = _fields("mjModel")[0]["vis"], {}
+    sections = {field.name: field for field in structs()["mjVisual"].fields}
+    for section, names in (
+        ("rgba", ("actuator", "actuatornegative", "actuatorpositive", "contactpoint")),
+        ("map", ("alpha", "actuatortendon")),
+    ):
+        at, inner = _fields("mjVisual")[0][section], walk(sections[section].type.fields)[0]
+        found |= {f"model.vis.{section}.{name}": start + at + inner[name] for name in names}
+    return found
+
+
+def _struct(name: str, *, fill: int = 0) -> Any:
+    """Return memory for a struct, and some more, filled with one byte."""
+    buffer = (ctypes.c_ubyte * (_fields(name)[1] + _SPARE))()
+    ctypes.memset(buffer, fill, len(buffer))
+    return buffer
+
+
+def _floats(address: int, number: int) -> NDArray[np.float32]:
+    return np.ctypeslib.as_array((ctypes.c_float * number).from_address(address))
+
+
+def _int(address: int) -> int:
+    return ctypes.c_int.from_address(address).value
+
+
+def _verify_model(model: mujoco.MjModel, visual: dict[str, int]) -> None:
+    at = _fields("mjModel")[0]
+    for name in _ARRAYS:
+        check_pointer(model, name, at[name])
+    for name, offset in visual.items():
+        _, _, section, field = name.split(".")
+        shown = np.atleast_1d(np.asarray(getattr(getattr(model.vis, section), field), dtype=np.float32))
+        if not np.array_equal(_floats(model._address + offset, shown.size), shown):
+            raise refuse(f"{name} is not where its declaration puts it")
+
+
+def _verify_option() -> Any:
+    """Return memory with MuJoCo's default mjvOption, whose bytes are those that Python shows."""
+    at, size = _fields("mjvOption")
+    shown, memory = mujoco.MjvOption(), _struct("mjvOption", fill=0xA5)
+    library().mjv_defaultOption(memory)
+    raw, base = bytes(memory), shown.flags.__array_interface__["data"][0] - at["flags"]
+    for name in ("geomgroup", "sitegroup", "tendongroup", "actuatorgroup", "flags"):
+        array = np.asarray(getattr(shown, name))
+        same = raw[at[name] : at[name] + array.size] == array.tobytes()
+        if not same or array.__array_interface__["data"][0] != base + at[name]:
+            raise refuse(f"mjvOption.{name} is not where its declaration puts it")
+    if _int(ctypes.addressof(memory) + at["label"]) != shown.label or raw[size:] != b"\xa5" * _SPARE:
+        raise refuse("mjvOption is not what its declaration says")
+    if np.asarray(shown.tendongroup).size != GROUPS:
+        raise refuse("it has another number of groups")
+    return memory
+
+
+def _verify_scene(model: mujoco.MjModel, option: Any) -> None:
+    """Have MuJoCo fill a scene in memory of ours, and find in it what Python shows of the same scene."""
+    lib, data, camera = library(), mujoco.MjData(model), _struct("mjvCamera")
+    mujoco.mj_forward(model, data)
+    at, size = _fields("mjvScene")
+    memory, shown = _struct("mjvScene", fill=0xA5), mujoco.MjvScene(model, 7)
+    start = ctypes.addressof(memory)
+    lib.mjv_defaultScene(memory)
+    if bytes(memory)[size:] != b"\xa5" * _SPARE or any(bytes(memory)[at["status"] : size]):
+        raise refuse("mjvScene has another size")
+    lib.mjv_defaultCamera(camera)
+    lib.mjv_makeScene(model._address, memory, 7)
+    try:
+        lib.mjv_updateScene(
+            model._address, data._address, option, None, camera, int(mujoco.mjtCatBit.mjCAT_ALL), memory
+        )
+        mujoco.mjv_updateScene(
+            model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), int(mujoco.mjtCatBit.mjCAT_ALL), shown
+        )
+        numbers = {"maxgeom": 7, "ngeom": shown.ngeom, "status": 0}
+        if any(_int(start + at[name]) != value for name, value in numbers.items()) or shown.ngeom < 4:
+            raise refuse("mjvScene is not what its declaration says")
+        _verify_geoms(ctypes.c_uint64.from_address(start + at["geoms"]).value, shown)
+    finally:
+        lib.mjv_freeScene(memory)
+
+
+def _verify_geoms(first: int, shown: mujoco.MjvScene) -> None:
+    at, size = _fields("mjvGeom")
+    for k in range(shown.ngeom):
+        geom, here = shown.geoms[k], first + k * size
+        for name in _GEOM_NUMBERS:
+            value = getattr(geom, name)
+            found = _floats(here + at[name], 1)[0] if isinstance(value, float) else _int(here + at[name])
+            if found != value:
+                raise refuse(f"mjvGeom.{name} is not where its declaration puts it")
+        for name in _GEOM_ARRAYS:
+            value = np.asarray(getattr(geom, name)).ravel()
+            if not np.array_equal(_floats(here + at[name], value.size), value):
+                raise refuse(f"mjvGeom.{name} is not where its declaration puts it")
+
+
+def _find() -> Drawing:
+    """Return how to draw in the installed MuJoCo; `VersionError` where something cannot be verified."""
+    try:
+        geom, size = _fields("mjvGeom")
+        scene, option, model = _fields("mjvScene")[0], _fields("mjvOption")[0], _fields("mjModel")[0]
+        visual = _visual()
+        probe = mujoco.MjModel.from_xml_string(_XML)
+        _verify_model(probe, visual)
+        _verify_scene(probe, _verify_option())
+        label = {f.name: f for f in structs()["mjvGeom"].fields}["label"]
+        light = [geom[name] - geom["emission"] for name in ("specular", "shininess", "reflectance")]
+        if extent(label.type)[0] != LABEL or size % 4 or light != [4, 8, 12]:
+            raise refuse("mjvGeom is laid out in another way")
+    except (KeyError, AttributeError) as error:
+        raise refuse(f"its visualisation structs differ ({error})") from None
+    blank = (ctypes.c_ubyte * size)()
+    library().mjv_initGeom(blank, int(mujoco.mjtGeom.mjGEOM_NONE), None, None, None, None)
+    flags, bits = option["flags"], mujoco.mjtVisFlag
+    words = {f"scene.{name}": at for name, at in scene.items()} | {
+        f"geom.{name}": at for name, at in geom.items()
+    }
+    words |= {f"model.{name}": at for name, at in model.items()} | visual
+    words |= {f"option.{name}": option[name] for name in ("label", "tendongroup", "actuatorgroup")}
+    words |= {
+        "option.tendon": flags + int(bits.mjVIS_TENDON),
+        "option.actuator": flags + int(bits.mjVIS_ACTUATOR),
+        "option.activation": flags + int(bits.mjVIS_ACTIVATION),
+        "option.transparent": flags + int(bits.mjVIS_TRANSPARENT),
+        "geom.bytes": size,
+        "code.label_tendon": int(mujoco.mjtLabel.mjLABEL_TENDON),
+        "code.label_actuator": int(mujoco.mjtLabel.mjLABEL_ACTUATOR),
+        "code.capsule": int(mujoco.mjtGeom.mjGEOM_CAPSULE),
+        "code.sphere": int(mujoco.mjtGeom.mjGEOM_SPHERE),
+        "code.tendon": int(mujoco.mjtObj.mjOBJ_TENDON),
+        "code.actuator": int(mujoco.mjtObj.mjOBJ_ACTUATOR),
+        "code.unknown": int(mujoco.mjtObj.mjOBJ_UNKNOWN),
+        "code.dynamic": int(mujoco.mjtCatBit.mjCAT_DYNAMIC),
+        "code.decor": int(mujoco.mjtCatBit.mjCAT_DECOR),
+        "warn": ctypes.cast(library().mju_warning, ctypes.c_void_p).value or 0,
+        "full": ctypes.addressof(_FULL),
+    }  # fmt: skip
+    return Drawing([words[name] for name in bk.DRAWING], bytes(blank))
+
+
+_FULL = ctypes.create_string_buffer(_TEXT)
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(_FULL))  # blocks point to it, whatever happens to this module
+
+
+@functools.cache
+def drawing() -> Drawing | None:
+    """Return how to draw in the installed MuJoCo, or None, with a warning, where it cannot be verified."""
+    try:
+        return _find()
+    except VersionError as error:
+        warnings.warn(f"muscles run but are not drawn: {error}", RuntimeWarning, stacklevel=2)
+        return None

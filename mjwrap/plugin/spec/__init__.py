@@ -1,0 +1,1 @@
+"""What `install` changes in an MjSpec, and how that is undone."""

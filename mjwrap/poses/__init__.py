@@ -1,0 +1,1 @@
+"""Poses of a model: sweeps of joints over their ranges, random ones, and jumps along them."""

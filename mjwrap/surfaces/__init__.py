@@ -1,0 +1,14 @@
+"""Wrapping surfaces: the built-in ones, those that users write as functions, and triangles for pictures."""
+
+from mjwrap.surfaces.primitives import (
+    Capsule,
+    Cone,
+    Cylinder,
+    Ellipsoid,
+    EllipticCylinder,
+    Sphere,
+    Surface,
+    Torus,
+)
+
+__all__ = ["Capsule", "Cone", "Cylinder", "Ellipsoid", "EllipticCylinder", "Sphere", "Surface", "Torus"]
