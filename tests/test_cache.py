@@ -116,7 +116,7 @@ def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
     callee.write_text(text.replace("0.8825327733249912", "0.9825327733249912"))
     after = run(PULL, home, package)
     assert after.told[0].startswith(NOTICE)
-    assert len({path.parent for path in after.folder.rglob("fiber.velocity_curve-*.nbi")}) == 2
+    assert len([folder for folder in after.folder.iterdir() if "degroote_fregly-" in folder.name]) == 2
     assert abs(after.numbers[0] - before.numbers[0]) > 1e-3
     callee.write_text(text)
     again = run(PULL, home, package)

@@ -17,7 +17,7 @@ import numba
 
 from mjwrap.kernels import _folders
 
-TESTED = ("0.65", "0.66", "0.67", "0.68")  # by `scripts/check_numba.py`
+TESTED = ("0.65", "0.66", "0.67", "0.68")  # by `benchmarks/numba_versions.py`
 _PASSED, _FAILED, _BEGUN = "passed", "failed", "begun"
 _PATIENCE = 60.0  # [s] after which a process that began is taken to have crashed
 _NOTICE = (

@@ -15,7 +15,10 @@ from pathlib import Path
 
 
 def objection(folder: Path) -> str | None:
-    """Return why a folder, there or still to be made, cannot hold machine code; None where it can."""
+    """Return why a folder, there or still to be made, cannot hold machine code; None where it can.
+
+    Raises `OSError` where the way to it leads through a file, or cannot be looked at.
+    """
     if os.name == "nt":  # folders of a profile are its user's there; owners and groups are not numbered
         return None
     ways = _ways(folder)
@@ -27,8 +30,6 @@ def objection(folder: Path) -> str | None:
             found = os.lstat(way)
         except FileNotFoundError:
             continue  # made with mode 0700, in a folder that is looked at here
-        except OSError as error:
-            return f"{way} cannot be looked at ({error.strerror})"
         if found.st_uid not in trusted():
             return f"{way} belongs to user {found.st_uid}"
         if not stat.S_ISDIR(found.st_mode):
