@@ -146,6 +146,8 @@ def test_links_are_followed_one_by_one(places: Path) -> None:
     shared.chmod(0o755)
     real.chmod(0o777)
     assert _trust.objection(here / "first" / "mjwrap") == f"anyone may write to {real}"
+    real.chmod(0o1777)
+    assert _trust.objection(here / "first") == f"anyone may write to {real}"
     (here / "round").symlink_to(here / "round")
     assert not _folders._is_fit(here / "round" / "mjwrap", [])
 

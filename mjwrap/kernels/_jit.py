@@ -53,7 +53,8 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
         return function
     if _check.is_plain():
         with _places.kept(function):
-            return numba.njit(**_PLAIN)(function)
+            plain: Any = numba.njit(**_PLAIN)(function)
+        return plain
     from mjwrap.kernels import _kernel  # of parts that another numba may lack
 
     if function.__name__.startswith("_"):

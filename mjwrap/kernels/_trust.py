@@ -24,7 +24,7 @@ def objection(folder: Path) -> str | None:
     ways = _ways(folder)
     if ways is None:
         return f"{folder} leads through too many links"
-    me = os.getuid()
+    me, ends = os.getuid(), {Path(os.path.abspath(folder)), Path(os.path.realpath(folder))}
     for way in ways:
         try:
             found = os.lstat(way)
@@ -34,7 +34,7 @@ def objection(folder: Path) -> str | None:
             return f"{way} belongs to user {found.st_uid}"
         if not stat.S_ISDIR(found.st_mode):
             continue
-        if found.st_mode & stat.S_ISVTX and way != ways[0]:
+        if found.st_mode & stat.S_ISVTX and way not in ends:
             continue
         if found.st_mode & stat.S_IWOTH:
             return f"anyone may write to {way}"
