@@ -2,89 +2,36 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
-import subprocess
-import sys
-import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numba
 import pytest
-from numba.core import config
+from fresh_starts import NOTICE, SOLVE, Run, copy_of_the_package, kernel_file, run
 
-import mjwrap as mw
-from mjwrap.kernels import _jit
+from mjwrap.kernels import _check, _closure, _places, _probe
 
-PACKAGE = Path(mw.__file__).parent
-NOTICE = "mjwrap: compiling its kernels"
 PATIENCE = 5.0  # [s] 2 is the aim; machines that run tests are busy
 
-# A path over a cylinder and a sphere with a via point between them: most of what is compiled.
-SOLVE = """
-import json, mjwrap as mw
-row = [mw.Obstacle(mw.Cylinder(0.03), hint=(0.0, 0.03, 0.0)), mw.ViaPoint((-0.06, 0.01, 0.01)),
-       mw.Obstacle(mw.Sphere(0.02), pos=(-0.1, 0.0, 0.01), hint=(0.0, 0.02, 0.0))]
-path = mw.solve_path((0.1, 0.01, 0.0), (-0.2, 0.0, 0.02), row)
-twists = [[0.1, 0.2, 0.3, 1.0, -0.5, 0.2]] * 3
-from mjwrap.kernels import _jit
-print(json.dumps({
-    "numbers": [path.length, path.speed((0.1, 0, 0), (0, 0.2, 0), twists), *path.wrenches(5.0).ravel().tolist(),
-                *path.points(0.01).ravel().tolist()],
-    "converged": bool(path.converged), "folder": _jit._CACHE}))
-"""
 # The same path as a sweep, which calls compiled code that a solution of one path has kept already.
 SWEEP = (
     SOLVE.split("path =")[0]
     + """
 import numpy as np
-from mjwrap.kernels import _jit
+from mjwrap.kernels import _folders
 pos = np.tile([[0.0, 0.0, 0.0], [-0.06, 0.01, 0.01], [-0.1, 0.0, 0.01]], (3, 1, 1))
 quat = np.tile([1.0, 0.0, 0.0, 0.0], (3, 3, 1))
 sweep = mw.solve_sweep((0.1, 0.01, 0.0), (-0.2, 0.0, 0.02), row, pos, quat)
-print(json.dumps({"numbers": sweep.length.tolist(), "folder": _jit._CACHE}))
+print(json.dumps({"numbers": sweep.length.tolist(), "folder": str(_folders.base())}))
 """
 )
 # A kernel that compiles in seconds, and that calls one in another file.
 PULL = """
 import json, numpy as np
-from mjwrap.kernels import _jit
+from mjwrap.kernels import _folders
 from mjwrap.kernels.musculotendon import fiber
-print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": _jit._CACHE}))
+print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": str(_folders.base())}))
 """
-
-
-@dataclass
-class Run:
-    """What one program said and how long it took [s], interpreter and imports included."""
-
-    numbers: list[float]
-    folder: Path
-    told: list[str]
-    seconds: float
-
-
-def run(program: str, home: Path, package: Path = PACKAGE, **environment: str) -> Run:
-    """Run a program in a fresh interpreter whose caches are under `home`."""
-    kept = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA", "XDG"))}
-    kept |= {"PYTHONPATH": str(package.parent), "XDG_CACHE_HOME": str(home), "TMPDIR": str(home.parent)}
-    started = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        env=kept | environment,
-        cwd=home.parent,
-    )
-    seconds = time.perf_counter() - started
-    assert done.returncode == 0, done.stderr
-    said: dict[str, Any] = json.loads(done.stdout)
-    assert said.get("converged", True)
-    return Run(said["numbers"], Path(said["folder"]), done.stderr.splitlines(), seconds)
 
 
 @dataclass
@@ -114,9 +61,12 @@ def test_the_first_start_says_in_one_line_that_it_compiles(starts: Starts) -> No
 @pytest.mark.slow
 def test_machine_code_is_kept_in_the_users_cache(starts: Starts, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
-    assert starts.first.folder.is_relative_to(starts.home)
-    assert starts.first.folder.name == _jit.source_hash()
-    assert list(starts.first.folder.rglob("*.nbc"))
+    assert starts.first.folder == starts.home / "mjwrap"
+    folders = {path.parent.name for path in starts.first.folder.rglob("*.nbc")}
+    assert folders
+    for folder in folders:
+        module, _, version = folder.rpartition("-")
+        assert version == _closure.key(module, *_places.circumstances())
 
 
 @pytest.mark.slow
@@ -157,18 +107,17 @@ def test_machine_code_that_calls_other_code_finds_it(starts: Starts) -> None:
 
 
 def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
-    package, home = tmp_path / "mjwrap", tmp_path / "cache"
-    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    package, home = copy_of_the_package(tmp_path), tmp_path / "cache"
     before = run(PULL, home, package)
     assert before.told[0].startswith(NOTICE)
     assert run(PULL, home, package).told == []
-    callee = package / "kernels" / "musculotendon" / "degroote_fregly.py"
+    callee = kernel_file(package, "degroote_fregly")
     text = callee.read_text()
     assert text.count("0.8825327733249912") == 1
     callee.write_text(text.replace("0.8825327733249912", "0.9825327733249912"))
     after = run(PULL, home, package)
     assert after.told[0].startswith(NOTICE)
-    assert after.folder != before.folder
+    assert len([folder for folder in after.folder.iterdir() if "degroote_fregly-" in folder.name]) == 2
     assert abs(after.numbers[0] - before.numbers[0]) > 1e-3
     callee.write_text(text)
     again = run(PULL, home, package)
@@ -178,105 +127,14 @@ def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
 
 LOOK = """
 import json, mjwrap as mw
-from mjwrap.kernels import _jit
+from mjwrap.kernels import _folders
 muscles = [mw.Millard2012(100.0, 0.1, 0.2), mw.DeGrooteFregly2016(100.0, 0.1, 0.2), mw.MuscleSystem]
-print(json.dumps({"numbers": [], "folder": _jit._CACHE}))
+print(json.dumps({"numbers": [], "folder": str(_folders.base())}))
 """
 
 
 def test_an_import_compiles_nothing(tmp_path: Path) -> None:
     assert run(LOOK, tmp_path / "cache").told == []
-
-
-KERNELS = sorted(path.name for path in (PACKAGE / "kernels").glob("*.py"))
-
-
-@pytest.mark.parametrize("name", KERNELS)
-def test_every_kernel_source_counts(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for path in (PACKAGE / "kernels").glob("*.py"):
-        shutil.copy(path, tmp_path)
-    monkeypatch.setattr(_jit, "_HERE", tmp_path)
-    before = _jit.source_hash()
-    with (tmp_path / name).open("a") as file:
-        file.write("# a remark\n")
-    assert _jit.source_hash() != before
-
-
-def test_what_else_starts_a_new_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A new kernel file, another numba, checked bounds; and each of them another one."""
-    monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
-    hashes = [_jit.source_hash()]
-    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
-    hashes.append(_jit.source_hash())
-    monkeypatch.delenv("NUMBA_BOUNDSCHECK")
-    monkeypatch.setattr(numba, "__version__", "99.0")
-    hashes.append(_jit.source_hash())
-    for path in (PACKAGE / "kernels").glob("*.py"):
-        shutil.copy(path, tmp_path)
-    (tmp_path / "another_surface.py").touch()
-    monkeypatch.setattr(_jit, "_HERE", tmp_path)
-    hashes.append(_jit.source_hash())
-    assert len(set(hashes)) == len(hashes)
-
-
-# --------------------------------------------------------------------------------- where it is kept
-
-
-@pytest.fixture
-def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A machine on which every place for a cache is under one folder."""
-    monkeypatch.setattr(config, "CACHE_DIR", "")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    return tmp_path
-
-
-def test_the_cache_is_where_the_user_wants_it(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert _jit.cache_dir() == places / "xdg" / "mjwrap" / _jit.source_hash()
-    monkeypatch.setattr(config, "CACHE_DIR", str(places / "numba"))
-    assert _jit.cache_dir() == places / "numba" / "mjwrap" / _jit.source_hash()
-
-
-def test_a_place_that_cannot_be_written_is_passed_over(places: Path) -> None:
-    (places / "xdg").write_text("a file where a folder is wanted")
-    found = _jit.cache_dir()
-    assert found.is_relative_to(places / "temporary")
-    assert found.name == _jit.source_hash()
-    assert _jit.cache_dir() == found
-
-
-def test_a_user_without_a_home(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_home() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setattr(Path, "home", no_home)
-    assert _jit.cache_dir().is_relative_to(places / "temporary")
-
-
-@pytest.mark.skipif(os.name == "nt", reason="files have no numbered owners there")
-def test_machine_code_of_somebody_else_is_not_trusted(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Anyone may make the folder in the temporary one; loading machine code runs it."""
-    (places / "xdg").touch()
-    shared = _jit.cache_dir()
-    me = os.getuid()
-    monkeypatch.setattr(os, "getuid", lambda: me + 1)
-    found = _jit.cache_dir()
-    assert found != shared
-    assert found.is_relative_to(places / "temporary")
-
-
-def test_without_any_lasting_place_each_process_has_its_own(
-    places: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    blocked = places / "blocked"
-    blocked.touch()
-    monkeypatch.setattr(_jit, "_candidates", lambda: [blocked, blocked / "below"])
-    first, second = _jit.cache_dir(), _jit.cache_dir()
-    assert first != second
-    assert first.is_dir()
-    assert second.is_relative_to(places / "temporary")
 
 
 def test_kernels_run_from_a_place_passed_over_to(tmp_path: Path) -> None:
@@ -287,3 +145,105 @@ def test_kernels_run_from_a_place_passed_over_to(tmp_path: Path) -> None:
     assert not found.folder.is_relative_to(blocked)
     assert len(found.told) == 1
     assert run(PULL, blocked).told == []
+
+
+# ------------------------------------------------------------------ what is shared, and what is left alone
+
+
+@pytest.mark.slow
+def test_a_copy_of_the_package_shares_machine_code_and_needs_no_more_for_an_edit_elsewhere(
+    starts: Starts, tmp_path: Path
+) -> None:
+    """Where the package lies and what a path does not reach make no difference."""
+    package = copy_of_the_package(tmp_path)
+    for path in package.rglob("*.py"):
+        os.utime(path)
+    copied = run(SOLVE, starts.home, package)
+    assert copied.told == []
+    assert copied.numbers == starts.first.numbers
+    with kernel_file(package, "umberger").open("a") as file:
+        file.write("# a remark\n")
+    edited = run(SOLVE, starts.home, package)
+    assert edited.told == []
+    assert edited.numbers == starts.first.numbers
+
+
+# ------------------------------------------------------------------------------------- plain functions
+
+
+@pytest.mark.slow
+def test_kernels_that_numba_compiles_alone_find_the_same(starts: Starts) -> None:
+    """As where numba is one that the kernels' way of being linked does not fit."""
+    plain = run(SOLVE, starts.home, MJWRAP_PLAIN_NJIT="1")
+    assert len(plain.told) == 1
+    assert plain.told[0].startswith(NOTICE)
+    # other code is taken over, so that other multiplications and additions are fused
+    assert plain.numbers == pytest.approx(starts.first.numbers, rel=1e-11, abs=1e-12)
+    again = run(SOLVE, starts.home, MJWRAP_PLAIN_NJIT="1")
+    assert again.told == []
+    assert again.numbers == plain.numbers
+
+
+def test_a_verdict_on_numba_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _check.passes(tmp_path)
+    monkeypatch.setattr(_check, "_try", lambda: pytest.fail("tried again"))
+    assert _check.passes(tmp_path)
+    (verdict,) = tmp_path.iterdir()
+    verdict.write_text("failed")
+    assert not _check.passes(tmp_path)
+
+
+def test_a_numba_that_crashed_or_raised_does_not_pass(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail() -> bool:
+        raise AttributeError("'JITCodeLibrary' object has no attribute '_reload_init'")
+
+    monkeypatch.setattr(_probe, "passes", fail)
+    assert not _check.passes(tmp_path)
+    (verdict,) = tmp_path.iterdir()
+    verdict.write_text("begun")
+    os.utime(verdict, (0, 0))  # by a process that has long ended
+    monkeypatch.setattr(_probe, "passes", lambda: True)
+    assert not _check.passes(tmp_path)
+    os.utime(verdict)  # by one that may still be at it
+    assert _check.passes(tmp_path)
+
+
+UNKNOWN = """
+import json
+from mjwrap.kernels import _check
+_check.TESTED = ()
+from mjwrap.kernels import _folders
+from mjwrap.kernels.musculotendon import fiber
+print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0], _check.is_plain()], "folder": str(_folders.base())}))
+"""
+
+
+def test_an_unknown_numba_is_tried_and_one_that_does_not_fit_is_said(tmp_path: Path) -> None:
+    fit = run(UNKNOWN, tmp_path / "fit")
+    assert fit.numbers[1] is False
+    assert len(fit.told) == 1  # that it compiles
+    unfit = run(UNKNOWN.replace("TESTED = ()", "TESTED, _check._try = (), lambda: False"), tmp_path / "unfit")
+    assert unfit.numbers == [pytest.approx(fit.numbers[0], rel=1e-14), True]
+    assert len(unfit.told) == 2
+    assert "numba.njit alone" in unfit.told[0]
+    assert unfit.told[1].startswith(NOTICE)
+
+
+# ------------------------------------------------------------------------------------- what is announced
+
+
+NAMELESS = """
+import json, types, numba
+from mjwrap.kernels import _folders
+from mjwrap.kernels.musculotendon import fiber
+function = types.FunctionType((lambda x: x + 1.0).__code__, {}, "nameless")
+function.__module__ = None
+print(json.dumps({"numbers": [numba.njit(function)(1.0)], "folder": str(_folders.base())}))
+"""
+
+
+def test_a_users_function_that_belongs_to_no_module_is_compiled(tmp_path: Path) -> None:
+    found = run(NAMELESS, tmp_path / "cache")
+    assert (found.numbers, found.told) == ([2.0], [])

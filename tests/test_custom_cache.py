@@ -17,7 +17,7 @@ from custom_shapes import (
 )
 
 import mjwrap as mw
-from mjwrap.kernels import _jit
+from mjwrap.surfaces.codegen import library
 from mjwrap.surfaces.user import ImplicitSurface
 
 ROOT = Path(mw.__file__).parent.parent
@@ -28,7 +28,7 @@ sys.path.insert(0, {tests!r})
 from custom_shapes import torus, bean
 import mjwrap, math
 from mjwrap.surfaces.user import ImplicitSurface, ParametricSurface
-from mjwrap.kernels import _jit
+from mjwrap.surfaces.codegen import library
 from mjwrap.kernels.geometry import user_surface as custom
 started = time.perf_counter()
 shapes = [ParametricSurface(torus, (0.0, math.tau), (0.0, math.tau)), ImplicitSurface(bean, (0.06, 0.06, 0.04))]
@@ -42,7 +42,7 @@ for shape in shapes:
     size = math.hypot(*t)
     numbers += custom._geodesic_plain(shape.dims[1], (*start[:3], *(x / size for x in t), 0.02))
     numbers.append(custom._height_plain(shape.dims[3], 0.05, 0.02, 0.01))
-print(json.dumps({{"numbers": numbers, "hits": hits, "seconds": seconds, "folder": _jit._CACHE,
+print(json.dumps({{"numbers": numbers, "hits": hits, "seconds": seconds, "folder": str(library.folder()),
                    "sympy": "sympy" in sys.modules}}))
 """
 
@@ -116,7 +116,7 @@ def test_bounds_are_checked_on_request(tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_jit, "_CACHE", str(tmp_path))
+    monkeypatch.setattr(library, "folder", lambda: tmp_path)
     first = ImplicitSurface(sphere, 0.041)
     (file,) = tmp_path.glob("mjwrap_surface_*.py")
     text = file.read_text()

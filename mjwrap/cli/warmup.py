@@ -25,7 +25,7 @@ import mjwrap as mw
 from mjwrap.cli.common.models import load
 from mjwrap.cli.common.output import Report, add_json
 from mjwrap.errors import RecordingError, VersionError
-from mjwrap.kernels import _jit
+from mjwrap.kernels import _folders
 from mjwrap.text import counted
 
 SCENE = """
@@ -99,7 +99,7 @@ def execute(options: argparse.Namespace) -> int:
             parts.append(part)
     finally:
         event.unregister("numba:compile", count)
-    folder = Path(_jit._CACHE)
+    folder = _folders.base()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     report.say(f"{'compiled' if count.compiled else 'nothing to compile'}; {size / 1e6:.0f} MB in {folder}")
     report.finish({"parts": parts, "compiled": count.compiled, "folder": str(folder), "bytes": size})

@@ -19,6 +19,15 @@ from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
 Dispatcher: Any = CPUDispatcher
+OPTIONS: dict[str, Any] = {
+    "nopython": True,
+    "boundscheck": None,  # by NUMBA_BOUNDSCHECK
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cfunc_wrapper": True,
+    "_nrt": False,  # no counting of references on every array handed on; no new arrays either
+}
 
 
 class Kernel(Dispatcher):

@@ -22,8 +22,8 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import get_cfarray_intrinsic
 
+from mjwrap.kernels._check import is_plain
 from mjwrap.kernels._jit import config, inlined
 
 LANES = 8
@@ -66,9 +66,17 @@ def _stack(typing_context: Any) -> Any:
     return types.CPointer(types.float64)(), generate
 
 
+def _carray() -> Any:
+    """Return what makes an array of a pointer; numba's own makes one whose references are counted."""
+    if config.DISABLE_JIT or is_plain():
+        return getattr(numba, "carray")  # noqa: B009
+    from numba.np.arrayobj import get_cfarray_intrinsic
+
+    return get_cfarray_intrinsic("C", None)
+
+
 stack: Any = _plain_stack if config.DISABLE_JIT else intrinsic(_stack)
-# numba's own `carray` is a function that returns an array, which kernels cannot call: they count no references
-carray: Any = getattr(numba, "carray") if config.DISABLE_JIT else get_cfarray_intrinsic("C", None)  # noqa: B009
+carray: Any = _carray()
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Where generated modules are kept, and how they are loaded: written once, compiled once, found again by their content.
 
-A module's name is a hash of all that it is made from, so that nothing is ever out of date. Files are written beside the
-kernels' machine code in one go, with a fixed date: processes that write one at the same time write the same.
+A module's name is a hash of all that it is made from, and its folder is named by the sources that it imports, so that
+nothing is ever out of date. Files are written in one go: processes that write one at the same time write the same.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import re
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -24,11 +24,13 @@ from numba.core import event
 from numba.core.errors import NumbaError
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import _jit
+from mjwrap.kernels import _folders, _places
 
 PREFIX = "mjwrap_surface_"
+_IMPORTED = (
+    "mjwrap.surfaces.codegen.lanes"  # by every module that is made; it reaches all that they import of mjwrap
+)
 _HERE = Path(__file__).parent
-_DATE = 1_000_000_000  # of every file: numba asks for the date of a source to see whether machine code is out of date
 _NOTICE = "mjwrap: compiling the surface {}, once for this machine and version (some seconds) ..."
 _LOCK = threading.RLock()
 
@@ -53,7 +55,7 @@ def load(key: str, make: Callable[[], str], label: str) -> ModuleType:
     with _LOCK:
         if name in sys.modules:
             return sys.modules[name]
-        path = Path(_jit._CACHE) / f"{name}.py"
+        path = folder() / f"{name}.py"
         if path.is_file():
             try:
                 return _import(name, path, label)
@@ -65,13 +67,18 @@ def load(key: str, make: Callable[[], str], label: str) -> ModuleType:
         return _import(name, path, label)
 
 
+@cache
+def folder() -> Path:
+    """Return where modules are kept that import these sources."""
+    return _places.new_place(_IMPORTED, "mjwrap.surfaces").folder
+
+
 def _write(path: Path, text: str) -> None:
     """Write a file in one go."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _folders.make_version(path.parent)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(text)
-    os.utime(name, (_DATE, _DATE))
     try:
         os.replace(name, path)
     except OSError:  # where files in use cannot be replaced, another process has just put the same one there
@@ -88,7 +95,8 @@ def _import(name: str, path: Path, label: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # for good: rows of paths hold addresses of its machine code
     try:
-        with _cache_of_the_kernels(), event.install_listener("numba:compile", _Announcer(name, label)):
+        _places.keep(name, path)
+        with _places.kept_in(path.parent), event.install_listener("numba:compile", _Announcer(name, label)):
             spec.loader.exec_module(module)
             module.TEXT = path.read_text(encoding="utf-8")  # pyright: ignore[reportAttributeAccessIssue]
     except NumbaError as error:
@@ -108,17 +116,6 @@ def forget(name: str, path: Path) -> None:
         path.unlink()
 
 
-@contextlib.contextmanager
-def _cache_of_the_kernels() -> Iterator[None]:
-    """Have numba keep machine code where the kernels' is."""
-    before = _jit.config.CACHE_DIR
-    _jit.config.CACHE_DIR = _jit._CACHE
-    try:
-        yield
-    finally:
-        _jit.config.CACHE_DIR = before
-
-
 class _Announcer(event.Listener):
     """Tells the user that a surface is being compiled rather than loaded."""
 
@@ -128,7 +125,7 @@ class _Announcer(event.Listener):
     def on_start(self, event: Any) -> None:
         dispatcher = event.data.get("dispatcher") if event.data else None
         function = getattr(dispatcher, "py_func", None)
-        if not self.silent and getattr(function, "__module__", "") == self.module:
+        if not self.silent and getattr(function, "__module__", None) == self.module:
             self.silent = True
             print(_NOTICE.format(self.label), file=sys.stderr, flush=True)
 

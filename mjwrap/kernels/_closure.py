@@ -1,0 +1,180 @@
+"""Which sources the machine code of a module depends on: those that it can reach by imports within this package.
+
+Imports are read from the text, wherever they stand: parsing it all would take longer than loading the machine code.
+Where in doubt a source counts: a package bound as a whole counts with all that is in it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import time
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+PACKAGE = "mjwrap"
+_ROOT = Path(__file__).parents[1]
+_HOW = ("mjwrap.kernels._jit", "mjwrap.kernels._kernel")  # decide what is made of every source
+# These decide only where it is kept, or nothing that is not among the circumstances that a key is given.
+_WHERE = {
+    f"mjwrap.kernels.{name}"
+    for name in ("_check", "_closure", "_folders", "_locator", "_places", "_probe", "_trust")
+}
+_STARTED = time.time()
+
+_BEFORE = re.compile(
+    r"(?:^|[;:])[ \t\f]*(?:from\b[ \t]*([.\w \t]+?)[ \t]*)?$"
+)  # the word `import`, in its line
+_AFTER = re.compile(r"(?!\w)[ \t]*(\((?:[^)#]|#[^\n]*)*\)|[^\n;#]*)")
+
+
+class Source(NamedTuple):
+    """One file: a hash of its bytes, whether it is as old as this process at least, and what it imports."""
+
+    digest: bytes
+    settled: bool
+    imports: tuple[str, ...]
+
+
+def key(module: str, *circumstances: object) -> str | None:
+    """Return 16 hexadecimal digits that change with the circumstances and with all sources that a module reaches.
+
+    None where a source was changed since this process began: what is in memory may then be older than the file.
+    """
+    sources = reached(module)
+    if module not in sources or not all(source.settled for source in sources.values()):
+        return None
+    digest = hashlib.sha256(repr(circumstances).encode())
+    for name in sorted(sources):
+        digest.update(name.encode() + b"\0" + sources[name].digest)
+    return digest.hexdigest()[:16]
+
+
+def reached(module: str) -> dict[str, Source]:
+    """Return the sources that count for a module, by name: it and its imports, theirs, and so on.
+
+    Packages on the way count, without what they import in their turn, but for the outermost one, a list of names.
+    """
+    found: dict[str, Source] = {}
+    todo = [module, *_HOW]
+    while todo:
+        name = todo.pop()
+        if name not in found and name not in _WHERE and (source := read(name)):
+            found[name] = source
+            todo += source.imports
+    for name in list(found):
+        for package in _packages_of(name):
+            if package != PACKAGE and (source := read(package)):
+                found.setdefault(package, source)
+    return found
+
+
+@cache
+def read(module: str) -> Source | None:
+    """Return the source of a module, as it was when first asked for; None where there is no such file."""
+    path = _file(module)
+    if path is None:
+        return None
+    with open(path, "rb") as file:
+        content, changed = file.read(), os.fstat(file.fileno()).st_mtime
+    text = content.decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
+    package = module if path.endswith("__init__.py") else module.rpartition(".")[0]
+    # A date in the future is that of a wrong clock, not of an edit.
+    settled = not _STARTED < changed <= time.time()
+    return Source(hashlib.sha256(content).digest(), settled, tuple(dict.fromkeys(_imports(text, package))))
+
+
+def forget() -> None:
+    """Read all sources anew: a module has been loaded again."""
+    read.cache_clear()
+    _file.cache_clear()
+
+
+@cache
+def _file(module: str) -> str | None:
+    """Return the file of a module of this package, None where there is none."""
+    first, *parts = module.split(".")
+    path = os.path.join(_ROOT, *parts)
+    if first == PACKAGE:
+        for file in (os.path.join(path, "__init__.py"), f"{path}.py"):
+            if os.path.isfile(file):
+                return file
+    return None
+
+
+def _packages_of(module: str) -> Iterator[str]:
+    while "." in module:
+        module = module.rpartition(".")[0]
+        yield module
+
+
+def _imports(text: str, package: str) -> Iterator[str]:
+    """Yield the names of the modules of mjwrap that a text imports; package: that the text belongs to."""
+    at = text.find("import")
+    while at >= 0:
+        before = _BEFORE.search(text[text.rfind("\n", 0, at) + 1 : at])
+        after = _AFTER.match(text, at + len("import"))
+        if before and after:
+            yield from _imported(before.group(1), after.group(1), package)
+        at = text.find("import", at + len("import"))
+
+
+def _imported(origin: str | None, listed: str, package: str) -> Iterator[str]:
+    """Yield what one import reaches: `from origin import listed`, or `import listed`."""
+    if origin is None and PACKAGE in listed:
+        for name, renamed in _names(listed):
+            if name.split(".")[0] == PACKAGE:
+                yield from _bound(name if renamed else PACKAGE)
+    elif origin:
+        origin = _absolute("".join(origin.split()), package)
+        if origin.split(".")[0] == PACKAGE:
+            yield from _taken(origin, [name for name, _ in _names(listed)])
+
+
+def _names(text: str) -> Iterator[tuple[str, bool]]:
+    """Yield what an import lists, and whether it is given another name."""
+    if text.startswith("("):
+        text = re.sub(r"#[^\n]*|[()]", " ", text)
+    for part in text.split(","):
+        words = part.split()
+        if words:
+            yield "".join(words[: words.index("as")] if "as" in words else words), "as" in words
+
+
+def _absolute(origin: str, package: str) -> str:
+    """Return a module's full name; with n leading dots it is sought n - 1 packages above the given one."""
+    name = origin.lstrip(".")
+    level = len(origin) - len(name)
+    if not level:
+        return name
+    above = package.split(".")[: len(package.split(".")) - level + 1]
+    return ".".join([*above, name] if name else above)
+
+
+def _taken(origin: str, names: list[str]) -> Iterator[str]:
+    """Yield what `from origin import names` reaches."""
+    path = _file(origin)
+    if path is None or not path.endswith("__init__.py"):
+        yield origin
+        return
+    for name in names:
+        if name == "*":
+            yield from _bound(origin)
+        elif _file(f"{origin}.{name}"):
+            yield from _bound(f"{origin}.{name}")
+        else:
+            yield origin
+
+
+def _bound(module: str) -> Iterator[str]:
+    """Yield what can be reached by a module's name: with a package, all that is in it."""
+    path = _file(module)
+    yield module
+    if path and path.endswith("__init__.py"):
+        folder = Path(path).parent
+        for file in sorted(folder.rglob("*.py")):
+            parts = file.relative_to(folder).with_suffix("").parts
+            yield ".".join([module, *(part for part in parts if part != "__init__")])

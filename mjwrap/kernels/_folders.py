@@ -1,0 +1,153 @@
+"""Where machine code is kept on the disk: one folder of this user, and in it one for each module and version of it."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+import uuid
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core import config as numba_config
+
+from mjwrap.kernels import _trust
+
+config: Any = numba_config  # its variables, set from the environment, are not known to type checkers
+
+_DAY = 86_400.0  # [s]
+_UNUSED = 30 * _DAY  # versions that nothing has asked for so long are removed
+_KEPT = 3  # newest versions of a module, kept however old
+_VERSION = re.compile(
+    r"(.+)-[0-9a-f]{16}|[0-9a-f]{16}|.+\.gone-[0-9a-f]{8}"
+)  # the second: of mjwrap 0.1 and before
+_REFUSED = "mjwrap: no machine code is kept in {}: {}; it is kept in {} instead"
+
+
+@cache
+def base() -> Path:
+    """Return the folder of all machine code, the same one as long as this process lives."""
+    return find_base()
+
+
+def find_base() -> Path:
+    """Return the best folder for machine code, created and writable; say which ones cannot be trusted."""
+    refused: list[tuple[Path, str]] = []
+    found = next((folder for folder in _candidates() if _is_fit(folder, refused)), None) or private()
+    for folder, reason in refused:
+        print(_REFUSED.format(folder, reason, found), file=sys.stderr, flush=True)
+    return found
+
+
+def _candidates() -> list[Path]:
+    """Return the folders in which machine code may be kept, best first."""
+    found = []
+    if config.CACHE_DIR:  # NUMBA_CACHE_DIR
+        found.append(Path(config.CACHE_DIR) / "mjwrap")
+    if os.environ.get("XDG_CACHE_HOME"):  # on any system
+        found.append(Path(os.environ["XDG_CACHE_HOME"]) / "mjwrap")
+    else:
+        import platformdirs  # takes some milliseconds
+
+        with contextlib.suppress(
+            RuntimeError
+        ):  # a user without a home; older versions return a relative path
+            usual = platformdirs.user_cache_path("mjwrap", appauthor=False)
+            if usual.is_absolute():
+                found.append(usual)
+    user = os.environ.get("USER", os.environ.get("USERNAME", "user"))
+    found.append(Path(tempfile.gettempdir()) / f"mjwrap-{user}")
+    return found
+
+
+def _is_fit(folder: Path, refused: list[tuple[Path, str]]) -> bool:
+    """Return whether machine code can be kept in a folder, made where missing; add to `refused` why it must not."""
+    try:
+        reason = _trust.objection(folder)  # before anything is made in a place of somebody else's
+        if reason is None:
+            make(folder)
+            with tempfile.TemporaryFile(dir=folder):
+                reason = _trust.objection(folder)  # somebody else may have made it in the meantime
+    except OSError:
+        return False
+    if reason is not None:
+        refused.append((folder, reason))
+    return reason is None
+
+
+@cache
+def private() -> Path:
+    """Return a folder of this process alone, removed with it."""
+    folder = tempfile.mkdtemp(prefix="mjwrap-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+def make(folder: Path) -> None:
+    """Make a folder, and those that contain it, such that only this user can look into the new ones."""
+    missing = [way for way in (folder, *folder.parents) if not way.exists()]
+    for way in reversed(missing):
+        way.mkdir(mode=0o700, exist_ok=True)
+    if not folder.is_dir():
+        raise NotADirectoryError(folder)
+
+
+def make_version(folder: Path) -> None:
+    """Make the folder of one version of a module, and remove old ones of it."""
+    if not folder.is_dir():
+        make(folder)
+        prune(folder)
+
+
+def use(folder: Path) -> None:
+    """Note, once a day, that a version is in use."""
+    with contextlib.suppress(OSError):
+        if time.time() - folder.stat().st_mtime > _DAY:
+            os.utime(folder)
+
+
+def prune(new: Path) -> None:
+    """Remove versions of a module not used for long, but for the newest, and what older mjwraps left behind."""
+    module = _module_of(new.name)
+    versions: list[tuple[float, Path]] = []
+    with contextlib.suppress(OSError):
+        for folder in new.parent.iterdir():
+            if folder != new and _module_of(folder.name) in (module, ""):
+                with contextlib.suppress(OSError):
+                    versions.append((_last_use(folder), folder))
+    versions.sort(reverse=True)
+    newest = [folder for _, folder in versions if _module_of(folder.name)][: _KEPT - 1]
+    for _, folder in versions:
+        if folder not in newest:
+            _remove_unused(folder)
+
+
+def _module_of(folder: str) -> str | None:
+    """Return the module whose version a folder holds: "" for leftovers, None for anything else."""
+    found = _VERSION.fullmatch(folder)
+    return (found.group(1) or "") if found else None
+
+
+def _last_use(folder: Path) -> float:
+    """Return when a version was last used or added to."""
+    dates = [folder.stat().st_mtime]
+    if not _module_of(folder.name):  # older mjwraps wrote to folders in it, and left its own date alone
+        dates += [below.stat().st_mtime for below in folder.iterdir()]
+    return max(dates)
+
+
+def _remove_unused(folder: Path) -> None:
+    """Remove a version unless it was used of late; it goes out of others' sight in one step, then from the disk."""
+    with contextlib.suppress(OSError):
+        if (
+            time.time() - _last_use(folder) > _UNUSED
+        ):  # asked last thing: another process may just have begun to use it
+            gone = folder.with_name(f"{folder.name}.gone-{uuid.uuid4().hex[:8]}")
+            folder.rename(gone)
+            shutil.rmtree(gone, ignore_errors=True)

@@ -1,0 +1,42 @@
+"""Three small kernels that show whether numba links and keeps functions as `_kernel.py` takes it to."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+from numba.core import types
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from mjwrap.kernels import _kernel
+
+
+def _multiply(x, n):
+    return n * x
+
+
+def _shift(x):
+    return x + 1.0
+
+
+def _combine(x):
+    return multiply(x, 2) + multiply(x, 3) + shift(x)
+
+
+# Names of the module, under which `_kernel.py` looks them up.
+multiply = _kernel.Apart(_multiply, _kernel.OPTIONS)
+shift = _kernel.Hidden(_shift, _kernel.OPTIONS | {"no_cpython_wrapper": True})
+combine = _kernel.Kernel(_combine, _kernel.OPTIONS)
+_multiply.__qualname__ = "multiply"
+
+
+def passes() -> bool:
+    """Return whether calls by a symbol, constants as arguments and machine code from a file do what they should."""
+    if combine(1.5) != 10.0 or len(multiply.overloads) != 1:
+        return False
+    (compiled,) = combine.overloads.values()
+    loads = [load for load in compiled.library._reload_init if load.args[1] == "multiply"]
+    kept: Any = pickle.loads(dumps(compiled._reduce()))
+    loaded = CompileResult._rebuild(combine.targetctx, *kept)
+    return bool(loads) and loaded.entry_point(1.5) == 10.0 and loaded.signature.args == (types.float64,)
