@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.coupling.groups import Routes
 from mjwrap.kernels.musculotendon import dynamics, tension
+from mjwrap.kernels.musculotendon.groups import Muscles
 from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
 from mjwrap.muscles.laws import ActuatorForce
 
@@ -40,6 +42,17 @@ class Plan:
     output: (
         Ints  # (n,) of the actuator whose length, velocity and moment mjwrap writes; -1 where wrenches act
     )
+
+    def route_group(self) -> Routes:
+        """Return the kernels' group of routes."""
+        return Routes(self.routes, self.weights, self.links)
+
+    def muscle_group(self, off: NDArray[np.bool_]) -> Muscles:
+        """Return the kernels' group of muscles; off (n,): which are switched off, read at every evaluation."""
+        return Muscles(
+            self.law, self.params, self.source, self.index, self.control, self.ctrl_low, self.ctrl_high,
+            self.form, self.times, off,
+        )  # fmt: skip
 
 
 def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, int, float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, PathError, StateError
-from mjwrap.kernels.coupling import evaluation, finite_checks
+from mjwrap.kernels.coupling import finite_checks, from_python
 from mjwrap.mjcf import has_plugin, read_declarations
 from mjwrap.model.arrays import build_plan
 from mjwrap.model.takeover import Takeover
@@ -46,7 +46,8 @@ class Evaluator(Results):
         self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
         self._states: dict[int, State] = {}
         self._groups_off = 0
-        self._off = np.zeros(self._plan.n, dtype=np.bool_)
+        self._off: NDArray[np.bool_] = np.zeros(plan.n, dtype=np.bool_)
+        self._routes, self._muscles = plan.route_group(), plan.muscle_group(self._off)
         self._excitation: Array = np.zeros(self._plan.n)
 
     @property
@@ -94,18 +95,15 @@ class Evaluator(Results):
 
         since [s]: how old the states in `data` are; ahead [s]: how long the tensions are to act.
         """
-        plan = self._plan
-        failed = evaluation.evaluate(
-            plan.routes, plan.weights, plan.links, plan.law, plan.params,
-            plan.source, plan.index, plan.control, plan.ctrl_low, plan.ctrl_high, plan.form, plan.times,
-            self._disabled(), self._root,
-            poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos,
-            data.act, data.ctrl, state.own, self._excitation, since, ahead, self.model.opt.timestep, TOLERANCE,
-            state.node, state.segments, state.count, state.info,
-            state.drive, state.start_activation, state.start_fiber, state.start_length,
-            state.activation, state.fiber,
-            state.length, state.velocity, state.tension, state.next_activation, state.next_fiber,
-            state.status, state.wrench,
+        self._switch_off()
+        failed = from_python.evaluate(
+            *self._routes, *self._muscles,
+            poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos, self._root,
+            data.act, data.ctrl, state.own, self._excitation,
+            since, ahead, self.model.opt.timestep,
+            TOLERANCE,
+            *state.paths, *state.start, *state.found,
+            state.wrench,
         )  # fmt: skip
         self._last = state
         state.time, state.evaluated = data.time, True
@@ -113,18 +111,15 @@ class Evaluator(Results):
         if failed:
             self._failed(state, poses, data)
 
-    def _disabled(self) -> NDArray[np.bool_]:
-        """Return which muscles (n,) the model's options switch off: all, or those of an actuator group."""
+    def _switch_off(self) -> None:
+        """Note which muscles the model's options switch off: all, or those of an actuator group."""
         everything = bool(int(self.model.opt.disableflags) & _DISABLE_ACTUATION)
         off = -1 if everything else int(self.model.opt.disableactuator)
         if off != self._groups_off:
             actuators = [muscle.actuator for muscle in self.declarations]
             groups = [int(self.model.actuator_group[a]) if a >= 0 else -1 for a in actuators]
-            self._off = np.array(
-                [everything or (g >= 0 and bool(off >> g & 1)) for g in groups], dtype=np.bool_
-            )
+            self._off[:] = [everything or (g >= 0 and bool(off >> g & 1)) for g in groups]
             self._groups_off = off
-        return self._off
 
     def _failed(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
         """Note which muscles have no path; raise where the user asked for that."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
-from mjwrap.kernels.coupling import moments, wrenches
+from mjwrap.kernels.coupling import from_python, wrenches
 from mjwrap.kernels.musculotendon import dynamics
 from mjwrap.kernels.musculotendon.tension import PATH_ACTUATOR
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
@@ -94,9 +94,10 @@ class MuscleSystem(Evaluator):
         self.forward(data)
         state, plan = self._last, self._plan
         jacobian = np.zeros((plan.n, self.model.nv))
-        moments.length_jacobian(
-            plan.routes, plan.weights, plan.links, state.segments, state.count, self._last_dof,
-            self._dofs[2], self._root, state.scratch.cdof, state.scratch.subtree_com, jacobian,
+        from_python.length_jacobian(
+            *self._routes, *state.paths,
+            self._last_dof, self._dofs[2], self._root, state.scratch.cdof, state.scratch.subtree_com,
+            jacobian,
         )  # fmt: skip
         return jacobian
 
@@ -121,11 +122,12 @@ class MuscleSystem(Evaluator):
         plan, state = self._plan, self._last
         if not state.evaluated:
             raise StateError("no muscle has been evaluated yet: call forward, apply or step first")
-        idle = self.held | self._disabled()
+        self._switch_off()
+        idle = self.held | self._off
         constants = metabolic_constants(metabolism, plan.law, plan.params)
         return compute_energetics(
-            np.where(idle, PATH_ACTUATOR, plan.law), plan.params, np.where(idle, 0.0, state.activation), state.drive,
-            state.length, np.where(idle, 0.0, state.velocity), state.fiber, constants,
+            np.where(idle, PATH_ACTUATOR, plan.law), plan.params, np.where(idle, 0.0, state.activation),
+            state.start.drive, state.length, np.where(idle, 0.0, state.velocity), state.fiber, constants,
         )  # fmt: skip
 
     # -------------------------------------------------------------------------------------- stepping

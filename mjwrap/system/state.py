@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
+from mjwrap.kernels.coupling.groups import Paths
+from mjwrap.kernels.musculotendon.groups import MuscleStates, StepStart
 from mjwrap.kernels.solved import segments
 from mjwrap.model.arrays import Plan
 
@@ -27,6 +29,7 @@ class Evaluation:
         self.segments = np.zeros((len(node) + routes, segments.SEGMENT))
         self.count = np.zeros(routes, dtype=np.int64)
         self.info = np.zeros((routes, layout.INFO))
+        self.paths = Paths(node, self.segments, self.count, self.info)
         self.numbers = np.zeros((len(NUMBERS), n))
         self.activation, self.fiber, self.length, self.velocity, self.tension = self.numbers
         self.status = np.zeros(n, dtype=np.int64)
@@ -43,10 +46,12 @@ class State(Evaluation):
     def __init__(self, model: mujoco.MjModel, plan: Plan) -> None:
         n = plan.n
         super().__init__(n, plan.node.copy(), len(plan.routes))
-        self.drive, self.start_activation, self.start_fiber, self.start_length = (
-            np.zeros(n) for _ in range(4)
-        )
+        self.start = StepStart(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
         self.next_activation, self.next_fiber = np.zeros(n), np.zeros(n)
+        self.found = MuscleStates(
+            self.activation, self.fiber, self.length, self.velocity, self.tension,
+            self.next_activation, self.next_fiber, self.status,
+        )  # fmt: skip
         self.own = np.zeros((n, 2))  # activations and fibre lengths of muscles without an actuator
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)

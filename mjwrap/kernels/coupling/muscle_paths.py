@@ -1,7 +1,7 @@
 """All muscles of a model in one compiled call: poses and velocities in, paths, lengths and their rates out.
 
-Arrays named as in MuJoCo's mjData and mjModel have their shapes and frames. A muscle has one or more routes (chains
-of nodes); several are joined by pulleys and enter with their weights.
+`groups.py` has the groups of arrays. A muscle has one or more routes (chains of nodes); several are joined by pulleys
+and enter with their weights.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ from mjwrap.kernels.spans.end_inside import has_length, list_standing
 
 # columns of `links` (N, 4): ids of a node's site, geom, hint site (-1 where none) and body
 L_SITE, L_GEOM, L_HINT, L_BODY = 0, 1, 2, 3
-# columns of `routes` (C, 8): first node, past the last node, origin and insertion site and their bodies, muscle, and
-# how many nodes are surfaces' rows
+# columns of a row of routes (C, 8): first node, past the last node, origin and insertion site and their bodies, muscle,
+# and how many nodes are surfaces' rows
 R_LO, R_HI, R_FROM, R_TO, R_FROM_BODY, R_TO_BODY, R_MUSCLE, R_SURFACES = 0, 1, 2, 3, 4, 5, 6, 7
 ROUTE = 8
 
 
 @jit
-def _place(lo, hi, links, site_xpos, geom_xpos, geom_xmat, node):
+def _place(lo, hi, links, poses, node):
     """Write the present poses, and at a cold start the hints, of nodes lo..hi; return whether one is cold."""
     cold = False
     for k in range(lo, hi):
         row = node[k]
         site, geom = links[k, L_SITE], links[k, L_GEOM]
         if geom < 0:
-            pos = site_xpos[site]
+            pos = poses.site_xpos[site]
             for i in range(3):
                 row[lay.POS + i] = pos[i]
             continue
-        pos, rot = geom_xpos[geom], geom_xmat[geom]
+        pos, rot = poses.geom_xpos[geom], poses.geom_xmat[geom]
         for i in range(3):
             row[lay.POS + i] = pos[i]
         for i in range(9):
@@ -44,9 +44,9 @@ def _place(lo, hi, links, site_xpos, geom_xpos, geom_xmat, node):
         cold = True
         hint = links[k, L_HINT]
         if hint >= 0:
-            x = site_xpos[hint, 0] - pos[0]
-            y = site_xpos[hint, 1] - pos[1]
-            z = site_xpos[hint, 2] - pos[2]
+            x = poses.site_xpos[hint, 0] - pos[0]
+            y = poses.site_xpos[hint, 1] - pos[1]
+            z = poses.site_xpos[hint, 2] - pos[2]
             row[lay.HINT] = 1.0
             for i in range(3):
                 row[lay.HINT + 1 + i] = rot[i] * x + rot[3 + i] * y + rot[6 + i] * z
@@ -65,22 +65,22 @@ def _roll_back(lo, hi, cold, node):
 
 
 @jit
-def end_body(routes, links, c, index):
+def end_body(rows, links, c, index):
     """Return the body that holds a segment's end: a node's, or the origin's or insertion's of route c."""
-    if index < routes[c, R_LO]:
-        return routes[c, R_FROM_BODY]
-    if index >= routes[c, R_HI]:
-        return routes[c, R_TO_BODY]
+    if index < rows[c, R_LO]:
+        return rows[c, R_FROM_BODY]
+    if index >= rows[c, R_HI]:
+        return rows[c, R_TO_BODY]
     return links[index, L_BODY]
 
 
 @jit
-def ends(c, j, routes, links, row):
+def ends(c, j, routes, row):
     """Return the bodies that hold the near and the far end of segment j of route c, whose row is given."""
     near, far = j - c - 1, j - c
-    if routes[c, R_SURFACES] > 0:
+    if routes.rows[c, R_SURFACES] > 0:
         near, far = int(row[G_NEAR]), int(row[G_FAR])
-    return end_body(routes, links, c, near), end_body(routes, links, c, far)
+    return end_body(routes.rows, routes.links, c, near), end_body(routes.rows, routes.links, c, far)
 
 
 @jit
@@ -100,50 +100,49 @@ def _rate(velocity, row, mx, my, mz):
 
 
 @jit
-def _rates(row, near, far, curved, cvel, subtree_com, body_rootid):
+def _rates(row, near, far, curved, poses):
     """Return how fast the segment in a row lengthens, whose ends two bodies hold [m/s].
 
     curved: its ends may lie on surfaces, where e need not be along a segment that vanishes.
     """
-    root = body_rootid[far]
-    mx, my, mz = moment(row, G_B, subtree_com[root])
-    rate = _rate(cvel[far], row, mx, my, mz)
-    if curved or body_rootid[near] != root:
-        mx, my, mz = moment(row, G_A, subtree_com[body_rootid[near]])
-    return rate - _rate(cvel[near], row, mx, my, mz)
+    root = poses.body_rootid[far]
+    mx, my, mz = moment(row, G_B, poses.subtree_com[root])
+    rate = _rate(poses.cvel[far], row, mx, my, mz)
+    if curved or poses.body_rootid[near] != root:
+        mx, my, mz = moment(row, G_A, poses.subtree_com[poses.body_rootid[near]])
+    return rate - _rate(poses.cvel[near], row, mx, my, mz)
 
 
 @jit
-def _curved_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid):
+def _curved_speed(c, routes, poses, paths):
     """Return the lengthening speed of route c over surfaces (17) [m/s]."""
     total = 0.0
-    first = routes[c, R_LO] + c
-    for j in range(first, first + seg_count[c]):
-        near, far = ends(c, j, routes, links, seg[j])
+    first = routes.rows[c, R_LO] + c
+    for j in range(first, first + paths.count[c]):
+        row = paths.segments[j]
+        near, far = ends(c, j, routes, row)
         if near != far:
-            total += _rates(seg[j], near, far, True, cvel, subtree_com, body_rootid)
+            total += _rates(row, near, far, True, poses)
     return total
 
 
 @jit
-def _solve_straight(
-    c, routes, links, site_xpos, cvel, subtree_com, body_rootid, node, seg, seg_count, info
-):  # fmt: skip
+def _solve_straight(c, routes, poses, paths):
     """Find the path of route c over via points alone; one whose points are not finite has no segments."""
-    lo, hi, site = routes[c, R_LO], routes[c, R_HI], routes[c, R_FROM]
-    near = routes[c, R_FROM_BODY]
+    route, links, site_xpos, info = routes.rows[c], routes.links, poses.site_xpos, paths.info
+    lo, hi, site, near = route[R_LO], route[R_HI], route[R_FROM], route[R_FROM_BODY]
     x, y, z = site_xpos[site, 0], site_xpos[site, 1], site_xpos[site, 2]
     total, speed = 0.0, 0.0
     for k in range(lo, hi + 1):
-        site = links[k, L_SITE] if k < hi else routes[c, R_TO]
-        far = links[k, L_BODY] if k < hi else routes[c, R_TO_BODY]
+        site = links[k, L_SITE] if k < hi else route[R_TO]
+        far = links[k, L_BODY] if k < hi else route[R_TO_BODY]
         point = site_xpos[site]
         px, py, pz = point[0], point[1], point[2]
         ex, ey, ez = px - x, py - y, pz - z
         size = math.sqrt(ex * ex + ey * ey + ez * ez)
         scale = 1.0 / size if size > VANISHING else 0.0
         total += size
-        row = seg[k + c]
+        row = paths.segments[k + c]
         row[G_NEAR] = k - 1
         row[G_FAR] = k
         row[G_A] = x
@@ -156,15 +155,15 @@ def _solve_straight(
         row[G_E + 1] = ey * scale
         row[G_E + 2] = ez * scale
         if k < hi:
-            node[k, lay.POS] = px
-            node[k, lay.POS + 1] = py
-            node[k, lay.POS + 2] = pz
+            paths.node[k, lay.POS] = px
+            paths.node[k, lay.POS + 1] = py
+            paths.node[k, lay.POS + 2] = pz
         if near != far:
-            speed += _rates(row, near, far, False, cvel, subtree_com, body_rootid)
+            speed += _rates(row, near, far, False, poses)
         near = far
         x, y, z = px, py, pz
     good = math.isfinite(total)
-    seg_count[c] = hi - lo + 1 if good else 0
+    paths.count[c] = hi - lo + 1 if good else 0
     info[c, lay.I_LENGTH] = total if good else 0.0
     info[c, lay.I_STATUS] = lay.CONVERGED if good else lay.NON_FINITE
     info[c, lay.I_ERROR] = 0.0
@@ -174,47 +173,45 @@ def _solve_straight(
 
 
 @jit
-def solve_routes(
-    routes, links, site_xpos, geom_xpos, geom_xmat, cvel, subtree_com, body_rootid, tol,
-    node, seg, seg_count, info,
-):  # fmt: skip
-    """Find path and speed of every route; info (C, INFO), seg and seg_count keep what failed routes had."""
-    for c in range(routes.shape[0]):
-        if routes[c, R_SURFACES] == 0:
-            _solve_straight(
-                c, routes, links, site_xpos, cvel, subtree_com, body_rootid, node, seg, seg_count, info
-            )
+def solve_routes(routes, poses, paths, tol):
+    """Find path and speed of every route; `paths` keeps what failed routes had."""
+    node, seg, info, site_xpos = paths.node, paths.segments, paths.info, poses.site_xpos
+    for c in range(routes.rows.shape[0]):
+        route = routes.rows[c]
+        if route[R_SURFACES] == 0:
+            _solve_straight(c, routes, poses, paths)
             continue
-        lo, hi = routes[c, R_LO], routes[c, R_HI]
-        a, b = routes[c, R_FROM], routes[c, R_TO]
-        cold = _place(lo, hi, links, site_xpos, geom_xpos, geom_xmat, node)
+        lo, hi = route[R_LO], route[R_HI]
+        a, b = route[R_FROM], route[R_TO]
+        cold = _place(lo, hi, routes.links, poses, node)
         ox, oy, oz = site_xpos[a, 0], site_xpos[a, 1], site_xpos[a, 2]
         ix, iy, iz = site_xpos[b, 0], site_xpos[b, 1], site_xpos[b, 2]
         solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, True, info, c)
         status = info[c, lay.I_STATUS]
         if status == lay.CONVERGED:
-            seg_count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
+            paths.count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
         elif has_length(status, info[c, lay.I_ERROR]):
-            seg_count[c] = list_standing(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
+            paths.count[c] = list_standing(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
         else:  # where a string comes out again is anybody's guess
             _roll_back(lo, hi, cold or status == lay.ENDPOINT_INSIDE, node)
             continue
-        info[c, lay.I_SPEED] = _curved_speed(c, routes, links, seg, seg_count, cvel, subtree_com, body_rootid)
+        info[c, lay.I_SPEED] = _curved_speed(c, routes, poses, paths)
 
 
 @jit
-def measure_muscles(routes, weights, info, length, velocity, status):
-    """Turn solved routes into length [m], velocity [m/s] and status of every muscle, (n,) each.
+def measure_muscles(routes, info, states):
+    """Turn solved routes into length [m], velocity [m/s] and status of every muscle.
 
     A muscle with a route without a path keeps its last values; its status says why. Where something stands in for every
-    path that is missing (`foot.py`), the muscle has values, and the status a minus sign.
+    path that is missing (`end_inside.py`), the muscle has values, and the status a minus sign.
     """
+    length, velocity, status = states.length, states.velocity, states.status
     c = 0
     for m in range(status.shape[0]):
         first = c
         code, known = lay.CONVERGED, True
         total, speed = 0.0, 0.0
-        while c < routes.shape[0] and routes[c, R_MUSCLE] == m:
+        while c < routes.rows.shape[0] and routes.rows[c, R_MUSCLE] == m:
             here = int(info[c, lay.I_STATUS])
             if not has_length(here, info[c, lay.I_ERROR]):
                 code, known = here if known else code, False
@@ -224,8 +221,8 @@ def measure_muscles(routes, weights, info, length, velocity, status):
         if known:
             code = -code
             for r in range(first, c):
-                total += weights[r] * info[r, lay.I_LENGTH]
-                speed += weights[r] * info[r, lay.I_SPEED]
+                total += routes.weights[r] * info[r, lay.I_LENGTH]
+                speed += routes.weights[r] * info[r, lay.I_SPEED]
             if math.isfinite(speed):
                 length[m] = total
                 velocity[m] = speed

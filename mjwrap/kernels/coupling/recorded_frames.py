@@ -9,6 +9,7 @@ from __future__ import annotations
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.coupling.drawn_paths import route_contacts, route_points
+from mjwrap.kernels.coupling.groups import Dofs, Paths, Routes
 from mjwrap.kernels.coupling.moments import length_jacobian
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
@@ -102,16 +103,9 @@ def put_frame(
         touches[t, muscle], pulls[t, muscle] = contact, force
     if muscles.shape[0] > 0:
         length_jacobian(
-            routes,
-            weights,
-            links,
-            seg,
-            seg_count,
-            last_dof,
-            dof_parentid,
-            body_rootid,
-            cdof,
-            subtree_com,
+            Routes(routes, weights, links),
+            Paths(node, seg, seg_count, info),
+            Dofs(last_dof, dof_parentid, body_rootid, cdof, subtree_com),
             jacobian,
         )
         for k in range(muscles.shape[0]):

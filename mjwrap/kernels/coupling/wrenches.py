@@ -19,9 +19,7 @@ def _pull(pulled, force, row, mx, my, mz):
 
 
 @jit
-def body_wrenches(
-    routes, weights, links, seg, seg_count, tension, subtree_com, body_rootid, xipos, wrench
-):  # fmt: skip
+def body_wrenches(routes, poses, paths, tension, wrench):
     """Write to wrench (nbody, 6) what all muscles do to every body, in the convention of `xfrc_applied`.
 
     Moments are added up about the centre of mass of a body's tree, which both ends of a segment mostly share, and
@@ -30,15 +28,17 @@ def body_wrenches(
     for b in range(wrench.shape[0]):
         for i in range(6):
             wrench[b, i] = 0.0
-    for c in range(routes.shape[0]):
-        force = weights[c] * tension[routes[c, R_MUSCLE]]
+    subtree_com, body_rootid = poses.subtree_com, poses.body_rootid
+    for c in range(routes.rows.shape[0]):
+        route = routes.rows[c]
+        force = routes.weights[c] * tension[route[R_MUSCLE]]
         if force == 0.0:
             continue
-        first = routes[c, R_LO] + c
-        curved = routes[c, R_SURFACES] > 0
-        for j in range(first, first + seg_count[c]):
-            row = seg[j]
-            near, far = ends(c, j, routes, links, row)
+        first = route[R_LO] + c
+        curved = route[R_SURFACES] > 0
+        for j in range(first, first + paths.count[c]):
+            row = paths.segments[j]
+            near, far = ends(c, j, routes, row)
             if near == far:
                 continue
             root = body_rootid[far]
@@ -48,7 +48,7 @@ def body_wrenches(
                 mx, my, mz = moment(row, G_A, subtree_com[body_rootid[near]])
             _pull(wrench[near], force, row, mx, my, mz)
     for b in range(wrench.shape[0]):
-        pulled, centre, own = wrench[b], subtree_com[body_rootid[b]], xipos[b]
+        pulled, centre, own = wrench[b], subtree_com[body_rootid[b]], poses.xipos[b]
         fx, fy, fz = pulled[0], pulled[1], pulled[2]
         rx, ry, rz = centre[0] - own[0], centre[1] - own[1], centre[2] - own[2]
         pulled[3] += ry * fz - rz * fy

@@ -31,27 +31,32 @@ NO_FIBER = 0.0  # stands where no fibre length is known: the muscle starts at st
 
 
 @jit
-def read_states(
-    source, index, control, low, high, form, times, act, ctrl, own, excitation, since, timestep,
-    activation, fiber, drive,
-):  # fmt: skip
-    """Write activation, fibre length [m] and excitation of every muscle (n,), `since` [s] after a step's start.
+def read_states(muscles, inputs, timing, start):
+    """Write activation, fibre length [m] and excitation of every muscle at the step's start into `start`.
 
     What mjwrap integrates is read at the start only: a later stage of Runge-Kutta goes on from there.
-    Activations: FROM_ACT act[index]; EARLY what that will be a `timestep` [s] later; FROM_CTRL the drive; DIRECT the
+    Activations: FROM_ACT act[index]; EARLY what that will be a timestep later; FROM_CTRL the drive; DIRECT the
     drive; OWN own[m, 0]; KEPT act[index], with the fibre length beside it. The drive is the excitation for OWN and
-    DIRECT, else ctrl[control] clamped to [low, high].
+    DIRECT, else ctrl[control] clamped to [ctrl_low, ctrl_high].
     """
+    source, index, act, own = muscles.source, muscles.index, inputs.act, inputs.own
+    activation, fiber, drive = start.activation, start.fiber, start.drive
     for m in range(source.shape[0]):
         own_drive = source[m] == OWN or source[m] == DIRECT
-        drive[m] = excitation[m] if own_drive else min(max(ctrl[control[m]], low[m]), high[m])
+        if own_drive:
+            drive[m] = inputs.excitation[m]
+        else:
+            wanted = inputs.ctrl[muscles.control[m]]
+            drive[m] = min(max(wanted, muscles.ctrl_low[m]), muscles.ctrl_high[m])
         if source[m] == FROM_ACT:
             activation[m] = act[index[m]]
         elif source[m] == EARLY:
-            activation[m] = next_activation(form[m], times, m, act[index[m]], drive[m], timestep)
+            activation[m] = next_activation(
+                muscles.form[m], muscles.times, m, act[index[m]], drive[m], timing.timestep
+            )
         elif source[m] == FROM_CTRL or source[m] == DIRECT:
             activation[m] = drive[m]
-        elif since <= 0.0:
+        elif timing.since <= 0.0:
             activation[m] = min(max(act[index[m]], 0.0), 1.0) if source[m] == KEPT else own[m, 0]
             fiber[m] = act[index[m] + 1] if source[m] == KEPT else own[m, 1]
 
@@ -81,30 +86,32 @@ def is_elastic(law, params, m):
 
 
 @jit
-def drive_muscles(
-    law, params, source, form, times, off, since, ahead, drive, start_activation, start_fiber, start_length,
-    length, velocity, activation, fiber, tension, next_activation, next_fiber, status,
-):  # fmt: skip
-    """Write every muscle's tension, and its state at the end of the step, (n,) each.
+def drive_muscles(muscles, timing, start, states):
+    """Write every muscle's tension, and its state at the end of the step, into `states`, which has length and speed.
 
-    The states in start_activation, start_fiber and start_length are `since` [s] old (a stage of Runge-Kutta; written
-    here where it is zero); the tension is to act for `ahead` [s] from here. Over both an elastic tendon takes one
+    The states in `start` are `since` [s] old (a stage of Runge-Kutta; fibre and path length are written here where it
+    is zero); the tension is to act for `ahead` [s] from here. Over both an elastic tendon takes one
     implicit step, to the length that the path will have, so its tension is that at the end; with neither it is the
     tendon's at this state. Elsewhere the tension is that of this state. A muscle without a path (status) keeps its
-    tension and fibre length; one with a minus sign goes on and loses it (`coupling.measure_muscles`).
+    tension and fibre length; one with a minus sign goes on and loses it (`measure_muscles`).
     """
+    law, params, source, form, times, off = (
+        muscles.law, muscles.params, muscles.source, muscles.form, muscles.times, muscles.off,
+    )  # fmt: skip
+    length, velocity, fiber = states.length, states.velocity, states.fiber
+    next_fiber, status, since, ahead = states.next_fiber, states.status, timing.since, timing.ahead
     duration = since + ahead
     for m in range(law.shape[0]):
-        a, end = start_activation[m], start_activation[m]
+        a, end = start.activation[m], start.activation[m]
         if (source[m] == OWN or source[m] == KEPT) and not off[m]:
-            a = advance(form[m], end, drive[m], times[m, 0], times[m, 1], times[m, 2], since)
+            a = advance(form[m], end, start.drive[m], times[m, 0], times[m, 1], times[m, 2], since)
             if ahead > 0.0:
-                end = advance(form[m], end, drive[m], times[m, 0], times[m, 1], times[m, 2], duration)
+                end = advance(form[m], end, start.drive[m], times[m, 0], times[m, 1], times[m, 2], duration)
             else:
                 end = a
         if since <= 0.0:
-            start_length[m] = length[m]
-        activation[m], next_activation[m], next_fiber[m] = a, end, start_fiber[m]
+            start.length[m] = length[m]
+        states.activation[m], states.next_activation[m], next_fiber[m] = a, end, start.fiber[m]
         if status[m] > lay.CONVERGED:
             continue
         status[m] = -status[m]
@@ -112,28 +119,28 @@ def drive_muscles(
             force = law_tension(law[m], params, m, a, length[m], velocity[m])
             fiber[m] = rigid_fiber(params, m, length[m]) if has_fiber(law[m]) else NO_FIBER
         else:
-            if start_fiber[m] <= NO_FIBER:
-                start_fiber[m] = equilibrium(law[m], params, m, start_activation[m], length[m])[0]
-            start_fiber[m] = max(start_fiber[m], params[m, LEAST])
-            fiber[m] = start_fiber[m]
-            next_fiber[m] = start_fiber[m]
+            if start.fiber[m] <= NO_FIBER:
+                start.fiber[m] = equilibrium(law[m], params, m, start.activation[m], length[m])[0]
+            start.fiber[m] = max(start.fiber[m], params[m, LEAST])
+            fiber[m] = start.fiber[m]
+            next_fiber[m] = start.fiber[m]
             if off[m] or duration <= 0.0:
                 force = tendon_force(law[m], params, m, length[m], fiber[m])
             else:
-                growth = rate(form[m], drive[m], end, times[m, 0], times[m, 1], times[m, 2])
+                growth = rate(form[m], start.drive[m], end, times[m, 0], times[m, 1], times[m, 2])
                 next_fiber[m], force, _, _ = step_fiber(
-                    law[m], params, m, start_activation[m], end, growth,
-                    start_length[m], length[m] + ahead * velocity[m], velocity[m], start_fiber[m], duration,
+                    law[m], params, m, start.activation[m], end, growth,
+                    start.length[m], length[m] + ahead * velocity[m], velocity[m], start.fiber[m], duration,
                 )  # fmt: skip
                 if since > 0.0:
                     fiber[m] = next_fiber[m]
         if off[m]:
             force = 0.0
         if math.isfinite(force):
-            tension[m] = force
+            states.tension[m] = force
         else:
             status[m] = lay.NON_FINITE
-            next_fiber[m] = start_fiber[m]
+            next_fiber[m] = start.fiber[m]
 
 
 @jit

@@ -10,7 +10,10 @@ from typing import Any, NamedTuple
 
 from numba.core import types
 
+from mjwrap.kernels._types import compiled_types
 from mjwrap.kernels.coupling.evaluation import evaluate
+from mjwrap.kernels.coupling.groups import Paths, Poses, Routes
+from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart, Timing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st
@@ -41,24 +44,26 @@ class Entries(NamedTuple):
 
 
 def _evaluation() -> tuple[Any, ...]:
-    """Return the types of the arguments with which `stage` calls `evaluate`.
+    """Return the types of the arguments with which `stage` calls `evaluate`."""
 
-    Large kernels are called by symbols, which loading `evaluate` defines; numba loads a C function from its cache
-    without them.
-    """
-    kinds = {
-        "i": types.int64[::1], "I": types.int64[:, ::1], "b": types.boolean[::1], "s": types.float64,
-        "r": types.float64[::1], "R": types.float64[:, ::1],
-    }  # fmt: skip
-    plan, poses, states = "IrIiRiiirriR" + "bi", "RRRRRR", "rrRr" + "ssss"
-    paths, results = "RRiR", "rrrr" + "rrrrrrr" + "iR"
-    return tuple(kinds[letter] for letter in plan + poses + states + paths + results)
+    def group(kind: Any) -> Any:
+        return types.NamedTuple(compiled_types(kind), kind)
+
+    return (
+        group(Routes), group(Muscles), group(Poses), group(Inputs), group(Timing), types.float64,
+        group(Paths), group(StepStart), group(MuscleStates), types.float64[:, ::1],
+    )  # fmt: skip
 
 
 def compile_entries() -> Entries:
-    """Compile, or load, what is the same for every MuJoCo: the one place where the kernels are linked in."""
+    """Compile, or load, what is the same for every MuJoCo: the one place where the kernels are linked in.
+
+    Large kernels are called by symbols, `evaluate` among them. They have to be defined here: numba loads a C function
+    from its cache without them.
+    """
     signature = types.void(_WORD, _WORD, _WORD)
     evaluate.compile(_evaluation())
+    evaluate.get_overload(_evaluation())
     draw = callback(types.void(_WORD, _WORD, _WORD, _WORD), drawing.draw)
     return Entries(callback(signature, st.stage), callback(signature, st.finish), draw)
 

@@ -7,14 +7,21 @@ from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.coupling.evaluation import evaluate
-from mjwrap.kernels.coupling.muscle_paths import ROUTE
 from mjwrap.kernels.coupling.wrenches import body_wrenches, put, take_back
-from mjwrap.kernels.musculotendon.dynamics import TIMES, write_states
-from mjwrap.kernels.musculotendon.tension import PARAMS
-from mjwrap.kernels.solved import segments as sg
+from mjwrap.kernels.musculotendon.dynamics import write_states
+from mjwrap.kernels.musculotendon.groups import Timing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.follow import follow
+from mjwrap.plugin.callbacks.groups import (
+    inputs_of,
+    muscles_of,
+    paths_of,
+    poses_of,
+    routes_of,
+    start_of,
+    states_of,
+)
 from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word
 from mjwrap.plugin.callbacks.saving import floats, ints, load, load_held, save, sizes, state_of
 from mjwrap.plugin.callbacks.transmission import transmit
@@ -111,7 +118,7 @@ def stage(block, model, data):
         clock[bk.ACTED] = 0.0
         _erase(block)
         return
-    n, nodes, routes, bodies = sizes(block)
+    n, _, _, bodies = sizes(block)
     step, since, ahead = real(model + word(block + 8 * bk.TIMESTEP)), 0.0, 0.0
     if half(model + word(block + 8 * bk.INTEGRATOR)) == word(block + 8 * bk.RUNGE_KUTTA):
         since = _since(real(data + word(block + 8 * bk.TIME)), step, state[0], clock)
@@ -126,88 +133,21 @@ def stage(block, model, data):
         off[m] = idle or group[m] == bk.SILENT
         off[m] = off[m] or (0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0)
     wrench = floats(block, bk.A_WRENCH, (bodies, 6))
+    routes, poses, paths, states = routes_of(block), poses_of(block, data), paths_of(block), states_of(block)
+    timing = Timing(since, ahead, step)
     failed = evaluate(
-        ints(block, bk.A_ROUTES, (routes, ROUTE)),
-        floats(block, bk.A_WEIGHTS, (routes,)),
-        ints(block, bk.A_LINKS, (nodes, 4)),
-        ints(block, bk.A_LAW, (n,)),
-        floats(block, bk.A_PARAMS, (n, PARAMS)),
-        ints(block, bk.A_SOURCE, (n,)),
-        ints(block, bk.A_INDEX, (n,)),
-        ints(block, bk.A_CONTROL, (n,)),
-        floats(block, bk.A_CTRL_LOW, (n,)),
-        floats(block, bk.A_CTRL_HIGH, (n,)),
-        ints(block, bk.A_FORM, (n,)),
-        floats(block, bk.A_TIMES, (n, TIMES)),
-        off,
-        ints(block, bk.A_BODY_ROOTID, (bodies,)),
-        reals(word(data + word(block + 8 * bk.SITE_XPOS)), (word(block + 8 * bk.SITES), 3)),
-        reals(word(data + word(block + 8 * bk.GEOM_XPOS)), (word(block + 8 * bk.GEOMS), 3)),
-        reals(word(data + word(block + 8 * bk.GEOM_XMAT)), (word(block + 8 * bk.GEOMS), 9)),
-        reals(word(data + word(block + 8 * bk.CVEL)), (bodies, 6)),
-        reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
-        reals(word(data + word(block + 8 * bk.XIPOS)), (bodies, 3)),
-        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
-        reals(word(data + word(block + 8 * bk.CTRL)), (word(block + 8 * bk.CTRLS),)),
-        floats(block, bk.A_OWN, (n, 2)),
-        floats(block, bk.A_EXCITATION, (n,)),
-        since,
-        ahead,
-        step,
-        TOLERANCE,
-        floats(block, bk.A_NODE, (nodes, lay.ROW)),
-        floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
-        ints(block, bk.A_COUNT, (routes,)),
-        floats(block, bk.A_INFO, (routes, lay.INFO)),
-        floats(block, bk.A_DRIVE, (n,)),
-        floats(block, bk.A_START_ACTIVATION, (n,)),
-        floats(block, bk.A_START_FIBER, (n,)),
-        floats(block, bk.A_START_LENGTH, (n,)),
-        floats(block, bk.A_ACTIVATION, (n,)),
-        floats(block, bk.A_FIBER, (n,)),
-        floats(block, bk.A_LENGTH, (n,)),
-        floats(block, bk.A_VELOCITY, (n,)),
-        floats(block, bk.A_TENSION, (n,)),
-        floats(block, bk.A_NEXT_ACTIVATION, (n,)),
-        floats(block, bk.A_NEXT_FIBER, (n,)),
-        ints(block, bk.A_STATUS, (n,)),
+        routes, muscles_of(block), poses, inputs_of(block, data), timing, TOLERANCE, paths, start_of(block), states,
         wrench,
-    )
+    )  # fmt: skip
     if failed and since == 0.0:
         load_held(block, state)
-        body_wrenches(
-            ints(block, bk.A_ROUTES, (routes, ROUTE)),
-            floats(block, bk.A_WEIGHTS, (routes,)),
-            ints(block, bk.A_LINKS, (nodes, 4)),
-            floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
-            ints(block, bk.A_COUNT, (routes,)),
-            floats(block, bk.A_TENSION, (n,)),
-            reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
-            ints(block, bk.A_BODY_ROOTID, (bodies,)),
-            reals(word(data + word(block + 8 * bk.XIPOS)), (bodies, 3)),
-            wrench,
-        )
-    status, lost = ints(block, bk.A_STATUS, (n,)), flags(block + word(block + 8 * bk.A_LOST), (n,))
+        body_wrenches(routes, poses, paths, states.tension, wrench)
+    lost = flags(block + word(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
-        lost[m] = status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
+        lost[m] = states.status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _advance_into(block, data, state, wrench)
     if transmits:
-        transmit(
-            part,
-            block,
-            model,
-            data,
-            since == 0.0,
-            ints(block, bk.A_ROUTES, (routes, ROUTE)),
-            floats(block, bk.A_WEIGHTS, (routes,)),
-            ints(block, bk.A_LINKS, (nodes, 4)),
-            floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
-            ints(block, bk.A_COUNT, (routes,)),
-            ints(block, bk.A_BODY_ROOTID, (bodies,)),
-            reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
-            floats(block, bk.A_LENGTH, (n,)),
-            floats(block, bk.A_VELOCITY, (n,)),
-        )
+        transmit(part, block, model, data, since == 0.0, routes, poses, paths, states)
     clock[bk.ACTED] = 1.0
 
 

@@ -8,6 +8,7 @@ part of that block with a head of its own, which `mjwrap/plugin/blocks/transmiss
 
 from __future__ import annotations
 
+from mjwrap.kernels.coupling.groups import Dofs, Transmissions
 from mjwrap.kernels.coupling.moments import write_transmissions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
@@ -55,31 +56,23 @@ def _indices(part, which, owner, shape):
 
 
 @jit
-def transmit(
-    part, block, model, data, first_stage, routes, weights, links, seg, count, root, com, length, velocity
-):
+def transmit(part, block, model, data, first_stage, routes, poses, paths, states):
     """Write what the actuators of an instance's muscles see; first_stage: sensors, too, show the present state."""
-    n, dofs, outputs = length.shape[0], word(part + 8 * DOFS), word(part + 8 * OUTPUTS)
+    n, dofs, outputs = states.length.shape[0], word(part + 8 * DOFS), word(part + 8 * OUTPUTS)
     entries, tendons = word(part + 8 * MOMENTS), word(part + 8 * TENDONS)
-    gear = _field(part, GEAR, model, (outputs, 6))
-    write_transmissions(
+    bodies = poses.body_rootid.shape[0]
+    tree = Dofs(
+        _ints(part, A_LAST_DOF, (bodies,)),
+        _ints(part, A_PARENT, (dofs,)),
+        poses.body_rootid,
+        _field(part, CDOF, data, (dofs, 6)),
+        poses.subtree_com,
+    )
+    targets = Transmissions(
         _ints(part, A_OUTPUT, (n,)),
         _ints(part, A_TENDON, (n,)),
         _ints(part, A_TENDON_ROW, (n,)),
-        routes,
-        weights,
-        links,
-        seg,
-        count,
-        length,
-        velocity,
-        _ints(part, A_LAST_DOF, (root.shape[0],)),
-        _ints(part, A_PARENT, (dofs,)),
-        root,
-        _field(part, CDOF, data, (dofs, 6)),
-        com,
-        _floats(part, A_ROW, (dofs,)),
-        gear,
+        _field(part, GEAR, model, (outputs, 6)),
         _field(part, LENGTH, data, (outputs,)),
         _field(part, VELOCITY, data, (outputs,)),
         _indices(part, ROWNNZ, data, (outputs,)),
@@ -90,16 +83,17 @@ def transmit(
         _field(part, TEN_VELOCITY, data, (tendons,)),
         _field(part, TEN_J, data, (word(part + 8 * TENDON_MOMENTS),)),
     )
+    row = _floats(part, A_ROW, (dofs,))
+    write_transmissions(routes, paths, tree, states.length, states.velocity, targets, row)
     flags = half(model + word(block + 8 * bk.DISABLEFLAGS))
     if not first_stage or flags & word(part + 8 * NO_SENSORS):
         return
     sensors = word(part + 8 * SENSORS)
     sensor, limits = _ints(part, A_SENSOR, (sensors, 3)), _floats(part, A_LIMITS, (sensors, 2))
     shown = _field(part, SENSORDATA, data, (word(part + 8 * SENSOR_NUMBERS),))
-    sizes, output = _field(part, LENGTH, data, (outputs,)), _ints(part, A_OUTPUT, (n,))
     for k in range(sensors):
         m = sensor[k, 1]
-        value = sizes[output[m]]
+        value = targets.actuator_length[targets.output[m]]
         if sensor[k, 2] == 0:
-            value = _field(part, TEN_LENGTH, data, (tendons,))[_ints(part, A_TENDON, (n,))[m]]
+            value = targets.ten_length[targets.tendon[m]]
         shown[sensor[k, 0]] = min(max(value, limits[k, 0]), limits[k, 1])

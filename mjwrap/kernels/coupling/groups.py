@@ -1,0 +1,67 @@
+"""Named groups of the arrays that all muscles' paths are computed from and written to.
+
+Arrays named as in MuJoCo's mjData and mjModel have their shapes and frames.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mjwrap.kernels._types import FloatRows, Floats, Indices, IntRows, Ints
+
+
+class Routes(NamedTuple):
+    """Routes of muscles: chains of nodes. A muscle has one, or several that pulleys join."""
+
+    rows: IntRows  # (C, ROUTE), columns R_... of `muscle_paths.py`
+    weights: Floats  # (C,) share of a route in its muscle's length
+    links: IntRows  # (N, 4), columns L_...: what each node stands for in the model
+
+
+class Poses(NamedTuple):
+    """Where MuJoCo has sites, geoms and bodies, and how they move."""
+
+    site_xpos: FloatRows  # (nsite, 3)
+    geom_xpos: FloatRows  # (ngeom, 3)
+    geom_xmat: FloatRows  # (ngeom, 9)
+    cvel: FloatRows  # (nbody, 6)
+    subtree_com: FloatRows  # (nbody, 3)
+    xipos: FloatRows  # (nbody, 3)
+    body_rootid: Ints  # (nbody,)
+
+
+class Paths(NamedTuple):
+    """Paths as solved: what a warm start needs, straight segments, and how each search ended."""
+
+    node: FloatRows  # (N, ROW), see `layout.py`
+    segments: FloatRows  # (N + C, SEGMENT), see `solved/segments.py`
+    count: Ints  # (C,) segments of each route
+    info: FloatRows  # (C, INFO)
+
+
+class Dofs(NamedTuple):
+    """MuJoCo's tree of degrees of freedom, and how each moves."""
+
+    last_dof: Ints  # (nbody,) the last dof that moves a body, -1 where none does
+    parent: Ints  # (nv,) dof_parentid
+    body_rootid: Ints  # (nbody,)
+    cdof: FloatRows  # (nv, 6)
+    subtree_com: FloatRows  # (nbody, 3)
+
+
+class Transmissions(NamedTuple):
+    """Actuators, and tendons that show the same path, that take their lengths and moments from muscles' paths."""
+
+    output: Ints  # (n,) the actuator's row in rownnz, rowadr and moment; -1 for a muscle that pulls otherwise
+    tendon: Ints  # (n,) the tendon that shows the path too, -1 where none
+    tendon_row: Ints  # (n,) where its row begins in ten_j
+    gear: FloatRows  # (outputs, 6)
+    actuator_length: Floats
+    actuator_velocity: Floats
+    rownnz: Indices  # of the sparse moment, whose columns hold every dof that changes the path
+    rowadr: Indices
+    colind: Indices
+    moment: Floats
+    ten_length: Floats
+    ten_velocity: Floats
+    ten_j: Floats

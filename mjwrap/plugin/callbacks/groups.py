@@ -1,0 +1,111 @@
+"""The kernels' groups of arrays, as they lie in a block, in mjData and in mjModel."""
+
+from __future__ import annotations
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels.coupling.groups import Paths, Poses, Routes
+from mjwrap.kernels.coupling.muscle_paths import ROUTE
+from mjwrap.kernels.musculotendon.dynamics import TIMES
+from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart
+from mjwrap.kernels.musculotendon.tension import PARAMS
+from mjwrap.kernels.solved import segments as sg
+from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks._cache import jit
+from mjwrap.plugin.callbacks.memory import flags, reals, word
+from mjwrap.plugin.callbacks.saving import floats, ints, sizes
+
+
+@jit
+def routes_of(block):
+    """Return the group of routes."""
+    _, nodes, routes, _ = sizes(block)
+    return Routes(
+        ints(block, bk.A_ROUTES, (routes, ROUTE)),
+        floats(block, bk.A_WEIGHTS, (routes,)),
+        ints(block, bk.A_LINKS, (nodes, 4)),
+    )
+
+
+@jit
+def muscles_of(block):
+    """Return the group of muscles."""
+    n = word(block + 8 * bk.MUSCLES)
+    return Muscles(
+        ints(block, bk.A_LAW, (n,)),
+        floats(block, bk.A_PARAMS, (n, PARAMS)),
+        ints(block, bk.A_SOURCE, (n,)),
+        ints(block, bk.A_INDEX, (n,)),
+        ints(block, bk.A_CONTROL, (n,)),
+        floats(block, bk.A_CTRL_LOW, (n,)),
+        floats(block, bk.A_CTRL_HIGH, (n,)),
+        ints(block, bk.A_FORM, (n,)),
+        floats(block, bk.A_TIMES, (n, TIMES)),
+        flags(block + word(block + 8 * bk.A_OFF), (n,)),
+    )
+
+
+@jit
+def poses_of(block, data):
+    """Return the group of poses and velocities in mjData."""
+    bodies, sites, geoms = word(block + 8 * bk.BODIES), word(block + 8 * bk.SITES), word(block + 8 * bk.GEOMS)
+    return Poses(
+        reals(word(data + word(block + 8 * bk.SITE_XPOS)), (sites, 3)),
+        reals(word(data + word(block + 8 * bk.GEOM_XPOS)), (geoms, 3)),
+        reals(word(data + word(block + 8 * bk.GEOM_XMAT)), (geoms, 9)),
+        reals(word(data + word(block + 8 * bk.CVEL)), (bodies, 6)),
+        reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
+        reals(word(data + word(block + 8 * bk.XIPOS)), (bodies, 3)),
+        ints(block, bk.A_BODY_ROOTID, (bodies,)),
+    )
+
+
+@jit
+def inputs_of(block, data):
+    """Return the group of controls and kept states."""
+    n = word(block + 8 * bk.MUSCLES)
+    return Inputs(
+        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
+        reals(word(data + word(block + 8 * bk.CTRL)), (word(block + 8 * bk.CTRLS),)),
+        floats(block, bk.A_OWN, (n, 2)),
+        floats(block, bk.A_EXCITATION, (n,)),
+    )
+
+
+@jit
+def paths_of(block):
+    """Return the group of solved paths."""
+    _, nodes, routes, _ = sizes(block)
+    return Paths(
+        floats(block, bk.A_NODE, (nodes, lay.ROW)),
+        floats(block, bk.A_SEG, (nodes + routes, sg.SEGMENT)),
+        ints(block, bk.A_COUNT, (routes,)),
+        floats(block, bk.A_INFO, (routes, lay.INFO)),
+    )
+
+
+@jit
+def start_of(block):
+    """Return the group of drives and states at the start of the step."""
+    n = word(block + 8 * bk.MUSCLES)
+    return StepStart(
+        floats(block, bk.A_DRIVE, (n,)),
+        floats(block, bk.A_START_ACTIVATION, (n,)),
+        floats(block, bk.A_START_FIBER, (n,)),
+        floats(block, bk.A_START_LENGTH, (n,)),
+    )
+
+
+@jit
+def states_of(block):
+    """Return the group of what an evaluation finds."""
+    n = word(block + 8 * bk.MUSCLES)
+    return MuscleStates(
+        floats(block, bk.A_ACTIVATION, (n,)),
+        floats(block, bk.A_FIBER, (n,)),
+        floats(block, bk.A_LENGTH, (n,)),
+        floats(block, bk.A_VELOCITY, (n,)),
+        floats(block, bk.A_TENSION, (n,)),
+        floats(block, bk.A_NEXT_ACTIVATION, (n,)),
+        floats(block, bk.A_NEXT_FIBER, (n,)),
+        ints(block, bk.A_STATUS, (n,)),
+    )
