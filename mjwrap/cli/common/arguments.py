@@ -108,7 +108,9 @@ def add_json(parser: argparse.ArgumentParser, what: str) -> None:
 
 def read_kinds(text: str) -> list[str]:
     """Return the kinds of numbers in a list such as "length,moment_arm"; `UserError` lists them all."""
-    from mjwrap.runs.run_table import check_kinds  # with the muscles, which replaying a recording does not need
+    from mjwrap.runs.run_table import (
+        check_kinds,  # with the muscles, which replaying a recording does not need
+    )
 
     try:
         return check_kinds(kind.strip() for kind in text.split(","))
