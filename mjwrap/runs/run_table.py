@@ -20,7 +20,7 @@ from mjwrap.system import MuscleSystem
 Array = NDArray[np.float64]
 MUSCLE_KINDS = ("activation", "fiber_length", "length", "velocity", "tension")
 KINDS = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS, "moment_arm")
-USUAL = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS)
+DEFAULT_KINDS = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS)
 
 
 class Column(NamedTuple):
@@ -96,7 +96,9 @@ class RunTable:
     kinds: of `KINDS`, whose columns `columns` describes. `TableError` for an unknown kind.
     """
 
-    def __init__(self, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Iterable[str] = USUAL) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Iterable[str] = DEFAULT_KINDS
+    ) -> None:
         self._columns = columns(model, muscles, check_kinds(kinds))
         self.names = tuple(name for column in self._columns for name in column.names)
         self._kept: list[tuple[float, Array]] = []
@@ -119,7 +121,11 @@ class RunTableFile(RunTable):
     """Writes a `RunTable` to a file: text as the run goes on, so that a long run needs no memory; NPZ at the end."""
 
     def __init__(
-        self, output: PartFile, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Iterable[str] = USUAL
+        self,
+        output: PartFile,
+        model: mujoco.MjModel,
+        muscles: MuscleSystem,
+        kinds: Iterable[str] = DEFAULT_KINDS,
     ) -> None:
         super().__init__(model, muscles, kinds)
         self._output = output

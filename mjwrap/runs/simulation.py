@@ -18,7 +18,7 @@ from mjwrap.runs.engine import MODES, start_engine
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
-from mjwrap.runs.run_table import USUAL, RunTable
+from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
 
 Log = Callable[[mujoco.MjData], object]  # takes the state of a sample
 
@@ -142,7 +142,7 @@ class Simulation:
         return time.perf_counter() - started
 
 
-def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = USUAL) -> Table:
+def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = DEFAULT_KINDS) -> Table:
     """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
 
     source: an MJCF or MJB file, or "myo_sim:NAME". kinds: which numbers the table holds, of `run_table.KINDS`; columns

@@ -43,10 +43,10 @@ from mjwrap.cli.run.running import RunCommandSettings, run
 from mjwrap.files import SUFFIXES
 from mjwrap.runs.engine import MODES
 from mjwrap.runs.models import INTEGRATORS
-from mjwrap.runs.run_table import KINDS, USUAL
+from mjwrap.runs.run_table import DEFAULT_KINDS, KINDS
 from mjwrap.runs.simulation import RunSettings
 
-COLUMNS = ",".join(USUAL)
+COLUMNS = ",".join(DEFAULT_KINDS)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ from mjwrap.files import SUFFIXES
 from mjwrap.runs.engine import Engine, PluginEngine
 from mjwrap.runs.muscle_analysis_tables import MuscleAnalysisTables
 from mjwrap.runs.plot_history import PlotHistory
-from mjwrap.runs.run_table import USUAL, RunTableFile
+from mjwrap.runs.run_table import DEFAULT_KINDS, RunTableFile
 from mjwrap.runs.simulation import Log
 
 
@@ -42,7 +42,7 @@ class OutputSettings:
     plot: str | None = None
     csv: str | None = None
     table: str | None = None
-    kinds: Sequence[str] = USUAL
+    kinds: Sequence[str] = DEFAULT_KINDS
     analysis: str | None = None
 
     @property
