@@ -12,7 +12,7 @@ import pytest
 from cli_runs import CART, CASE2, ELBOW, ENTERS, ROOT, environment, only_files, rows_of, said, simulate
 
 import mjwrap as mw
-from mjwrap.cli.run.samples import spanned
+from mjwrap.runs.run_table import spanned
 
 OWN = """<custom>
     <numeric name="mjwrap_free_max_isometric_force" data="100"/>

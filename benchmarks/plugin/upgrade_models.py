@@ -25,14 +25,13 @@ import mujoco
 import numpy as np
 
 import mjwrap as mw
-from mjwrap.cli.common.errors import UserError
-from mjwrap.cli.common.models import load_spec
 from mjwrap.comparison import Jump, compare_poses
 from mjwrap.comparison.motion import unstable
 from mjwrap.mjcf import name_of, read_declarations
 from mjwrap.paths import Status
 from mjwrap.plugin import read
 from mjwrap.poses.joint_sweeps import read_couplings
+from mjwrap.runs.models import load_spec
 
 MODELS = [f"myo_sim:{name}" for name in ("myolegs", "myoarm_r", "myohand_r", "myotorso", "myofullbody")]
 HOLD = 0.1  # [s] that a control is held
@@ -187,7 +186,7 @@ def main() -> int:
     for name in options.models:
         try:
             mw.install(load_spec(name))
-        except (UserError, mw.ModelError) as error:
+        except mw.ModelError as error:
             parser.error(f"{name}: {error}")
     print(f"mjwrap {mw.__version__}, MuJoCo {mujoco.__version__}")
     rows, bad = [], False

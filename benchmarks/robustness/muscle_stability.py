@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import mjwrap as mw
-from mjwrap.cli.common.models import load_spec
 from mjwrap.mjcf.actuators import mujoco_law
 from mjwrap.muscles.laws import MuJoCoMuscle
+from mjwrap.runs.models import load_spec
 
 LAWS = {"degroote_fregly_2016": mw.DeGrooteFregly2016, "millard_2012": mw.Millard2012}
 MODELS = ("elbow", "myohand_r", "myoarm_r", "myolegs", "myotorso", "myofullbody")

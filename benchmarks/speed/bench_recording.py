@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 from mjwrap import MuscleSystem, Recorder
-from mjwrap.cli.common.models import load
+from mjwrap.runs.models import load
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS_BEFORE = 100

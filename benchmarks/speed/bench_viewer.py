@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 
 import mjwrap as mw
-from mjwrap.cli.common.models import load_spec
+from mjwrap.runs.models import load_spec
 
 ELBOW = Path(__file__).resolve().parents[2] / "models" / "elbow" / "elbow.xml"
 STEPS = 50  # of a weakly excited motion, before a scene is filled

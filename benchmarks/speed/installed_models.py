@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mjwrap as mw
-from mjwrap.cli.common.models import load_spec
+from mjwrap.runs.models import load_spec
 
 ELBOW = Path(__file__).parents[2] / "models" / "elbow" / "elbow.xml"
 HOME = "our elbow"  # needs no myo_sim

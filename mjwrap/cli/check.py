@@ -17,13 +17,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from dataclasses import dataclass
 
 from mjwrap.checking import check_model
-from mjwrap.cli.common.arguments import add_model, at_least
+from mjwrap.cli.common.arguments import add_json, add_model, at_least
 from mjwrap.cli.common.errors import FAULTS
-from mjwrap.cli.common.models import load, start_keyframe, start_state
-from mjwrap.cli.common.output import Report, add_json
+from mjwrap.cli.common.output import Report
 from mjwrap.cli.common.progress import Stages
+from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.text import counted
 
 
@@ -36,18 +37,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "verdicts and figures")
 
 
+@dataclass(frozen=True)
+class CheckSettings:
+    """The settings of `mjwrap check`.
+
+    model: a file, or "myo_sim:NAME". keyframe: the pose to sweep around, None for qpos0. poses: random ones, drawn with
+    seed; samples: poses of a sweep. json: a file for the figures, "-" for standard output, or None.
+    """
+
+    model: str
+    keyframe: str | None
+    poses: int
+    samples: int
+    seed: int
+    json: str | None
+
+
 def execute(options: argparse.Namespace) -> int:
-    """Check, and say what holds."""
-    model = load(options.model)
-    base = start_state(model, start_keyframe(model, options.keyframe)).qpos
-    report = Report(options.json)
+    """Check, and return the exit code."""
+    return check(
+        CheckSettings(
+            options.model, options.keyframe, options.poses, options.samples, options.seed, options.json
+        )
+    )
+
+
+def check(settings: CheckSettings) -> int:
+    """Check, and say what holds; return the exit code."""
+    model = load(settings.model)
+    base = start_state(model, start_keyframe(model, settings.keyframe)).qpos
+    report = Report(settings.json)
     with contextlib.closing(Stages("steps", "checking")) as progress:
         found = check_model(
             model,
-            poses=options.poses,
-            samples=options.samples,
+            poses=settings.poses,
+            samples=settings.samples,
             base=base,
-            seed=options.seed,
+            seed=settings.seed,
             progress=progress,
         )
     facts = found.facts
@@ -55,9 +81,9 @@ def execute(options: argparse.Namespace) -> int:
     if coupled := facts["joints_that_follow"]:
         sweeps += f" ({counted(coupled, 'coupled joint')} moved along)"
     poses = f"{drawn} and {sweeps} of {counted(facts['poses_of_a_sweep'], 'pose')}"
-    report.say(f"{options.model}: {counted(facts['muscles'], 'muscle')} at {poses}")
+    report.say(f"{settings.model}: {counted(facts['muscles'], 'muscle')} at {poses}")
     report.say(found.table())
     failed = len(found.failed)
     report.say(f"{failed} of {counted(len(found.checks), 'check')} failed" if failed else "no check failed")
-    report.finish({"model": options.model, **found.as_dict()})
+    report.finish({"model": settings.model, **found.as_dict()})
     return FAULTS if failed else 0

@@ -1,4 +1,4 @@
-"""The command `mjwrap`: which commands there are, and where each begins; a command's module loads when it is called."""
+"""The command `mjwrap`: the list of its commands; the module of a command loads when it is called."""
 
 from __future__ import annotations
 
@@ -93,5 +93,5 @@ def _execute(name: str, arguments: list[str]) -> int:
     command.add_arguments(parser)
     options = parser.parse_args(arguments)
     options.given = list(arguments)  # as typed, for what says how it was made
-    note_inputs(options)
+    note_inputs(console.inputs(options))
     return command.execute(options)

@@ -14,6 +14,7 @@ import argparse
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,11 @@ import numpy as np
 from numba.core import event
 
 import mjwrap as mw
-from mjwrap.cli.common.models import load
-from mjwrap.cli.common.output import Report, add_json
+from mjwrap.cli.common.arguments import add_json
+from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels import _folders
+from mjwrap.runs.models import load
 from mjwrap.text import counted
 
 SCENE = """
@@ -71,17 +73,30 @@ class _Count(event.Listener):
         pass
 
 
+@dataclass(frozen=True)
+class WarmupSettings:
+    """The settings of `mjwrap warmup`: a model to evaluate too, and a file for the report ("-": standard output)."""
+
+    model: str | None
+    json: str | None
+
+
 def execute(options: argparse.Namespace) -> int:
+    """Compile, and return the exit code."""
+    return warm_up(WarmupSettings(options.model, options.json))
+
+
+def warm_up(settings: WarmupSettings) -> int:
     """Compile, and say what was done and where the machine code lies."""
-    report = Report(options.json)
-    model = load(options.model) if options.model else None
+    report = Report(settings.json)
+    model = load(settings.model) if settings.model else None
     count = _Count()
     event.register("numba:compile", count)
     steps: dict[str, Callable[[], object]] = {
         "paths": paths, "muscles": muscles, "plugin": plugin, "recording": recording,
     }  # fmt: skip
-    if model is not None:
-        steps[options.model] = lambda: evaluate(model)
+    if settings.model and model is not None:
+        steps[settings.model] = lambda: evaluate(model)
     parts = []
     try:
         for name, step in steps.items():

@@ -8,7 +8,6 @@ the insertion or a via point changes nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,11 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from mjwrap.errors import GeometryError, PathError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import hessian
+from mjwrap.paths.contact import Contact
 from mjwrap.paths.scene import Array, Point, vector
 from mjwrap.paths.status import Status
-
-if TYPE_CHECKING:
-    from mjwrap.paths.solution import Contact
 
 FAULTS = {
     hessian.VANISHING: "the straight segment that leaves {0} has no length, so its direction has no derivative",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,27 +11,12 @@ from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import polyline, segments
 from mjwrap.kernels.spans import end_inside
+from mjwrap.paths.contact import Contact
 from mjwrap.paths.derivatives import Derivatives
 from mjwrap.paths.scene import SAVED, Array, Point
 from mjwrap.paths.status import Status
 
 Ints = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Where a path touches one obstacle.
-
-    active: whether it does; P, Q (3,): first and last contact point, world [m] (None where not active);
-    arc_length: of the geodesic from P to Q [m]; second: where the string touches the same surface again, behind a
-    hollow that it bridges (through the air over a torus' hole), else None. A via point is always active, with P = Q.
-    """
-
-    active: bool
-    P: Array | None
-    Q: Array | None
-    arc_length: float
-    second: Contact | None = None
 
 
 class PathSolution(Derivatives):

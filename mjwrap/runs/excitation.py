@@ -1,4 +1,4 @@
-"""Which signal drives which muscle or actuator: from a few words, or from a file, to `data.ctrl`."""
+"""Excitation of muscles and actuators by signals, which are given as patterns or as tables."""
 
 from __future__ import annotations
 

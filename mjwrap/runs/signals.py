@@ -1,4 +1,4 @@
-"""Numbers over time for excitations, controls and prescribed motion: patterns written in a few words, and tables."""
+"""Signals over time for excitations, controls and prescribed motion, from patterns such as "sine:0.3,1" or tables."""
 
 from __future__ import annotations
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,15 +11,13 @@ from mjwrap.kernels.coupling import jacobian_rate, muscle_paths
 from mjwrap.kernels.solved import hessian
 from mjwrap.mjcf import name_of
 from mjwrap.paths.derivatives import FAULTS
+from mjwrap.system.results import Results
 from mjwrap.system.state import State
-
-if TYPE_CHECKING:
-    from mjwrap.system.muscle_system import MuscleSystem
 
 Array = NDArray[np.float64]
 
 
-def length_jacobian_rate(muscles: MuscleSystem, state: State, direction: ArrayLike | None) -> Array:
+def length_jacobian_rate(muscles: Results, state: State, direction: ArrayLike | None) -> Array:
     """Return the rate (n, nv) of dl/dq along `direction` (nv,), or qvel, at the poses that `state` was evaluated at."""
     model, plan, scratch = muscles.model, muscles._plan, state.scratch
     for i in np.flatnonzero(state.status):

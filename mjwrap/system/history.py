@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels.coupling import muscle_paths, recorded_frames
-from mjwrap.system.state import NUMBERS
-
-if TYPE_CHECKING:
-    from mjwrap.system.results import Results
+from mjwrap.model.arrays import Plan
+from mjwrap.system.state import NUMBERS, Evaluation
 
 Array = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -58,19 +57,22 @@ class Store:
 
 
 class History:
-    """Room for `rows` states, and as many frames, of the muscles whose results are given.
+    """Room for `rows` states, and as many frames, of the muscles of a model and its plan.
 
     A state is what every muscle has, a frame what is drawn: poses of the bodies, paths, contact points, forces, and
     moment arms of the pairs of a muscle and a coordinate that `muscles` and `dofs` (K,) name. Time goes along the first
-    axis of what is read as numbers. Points are in 32 bits; they stand in a Room, if one is given.
+    axis of what is read as numbers. Points are in 32 bits; they stand in a Room, if one is given. tree: the last dof of
+    every body (nbody,), the parent of every dof (nv,), the root of every body (nbody,). evaluation: returns the last
+    evaluation, which is kept.
     """
 
     def __init__(
-        self, results: Results, rows: int, muscles: Ints | None = None, dofs: Ints | None = None
-    ) -> None:
-        self._results = results
-        plan, model = results._plan, results.model
-        n, routes = plan.n, len(plan.routes)
+        self, model: mujoco.MjModel, plan: Plan, tree: tuple[Ints, Ints, Ints],
+        evaluation: Callable[[], Evaluation], rows: int, muscles: Ints | None = None, dofs: Ints | None = None,
+    ) -> None:  # fmt: skip
+        self._evaluation = evaluation
+        self._n = n = plan.n
+        routes = len(plan.routes)
         self._numbers = np.zeros((rows, len(NUMBERS), n))
         self._status = np.zeros((rows, n), dtype=np.int64)
         self._iterations = np.zeros((rows, routes))
@@ -84,13 +86,13 @@ class History:
             Store(rows, routes, 3), Store(rows, n, 3), Store(rows, n, recorded_frames.FORCE)
         )  # fmt: skip
         self._plan = plan.routes, plan.weights, plan.links
-        self._tree = results._last_dof, results._dofs[2], results._root
+        self._tree = tree
         for array in (self._numbers, self._arms, self._positions, self._quaternions):
             array.fill(0.0)  # has the system find the memory now, and not in the course of a run
 
     def put_state(self, row: int) -> None:
         """Keep the last evaluation's numbers as a row."""
-        last = self._results._evaluation()
+        last = self._evaluation()
         kept = self._numbers, self._status, self._iterations
         recorded_frames.put_state(row, last.numbers, last.status, last.info, *kept)
 
@@ -99,7 +101,7 @@ class History:
 
         spacing [m]: as for `Results.polylines`. Frames are put in order.
         """
-        last = self._results._evaluation()
+        last = self._evaluation()
         points, contacts, forces = self._points, self._contacts, self._forces
         while not recorded_frames.put_frame(
             *self._plan, last.node, last.segments, last.count, last.info, last.tension, spacing or 0.0, *self._tree,
@@ -114,10 +116,8 @@ class History:
         """Return what the first `rows` states were, (rows, n) each, by the names that `Results` has for them."""
         found = {name: self._numbers[:rows, i] for i, name in enumerate(NUMBERS)}
         found["status"] = self._status[:rows].astype(np.float64)
-        if self._results.n:
-            first = np.searchsorted(
-                self._results._plan.routes[:, muscle_paths.R_MUSCLE], np.arange(self._results.n)
-            )
+        if self._n:
+            first = np.searchsorted(self._plan[0][:, muscle_paths.R_MUSCLE], np.arange(self._n))
             found["iterations"] = np.add.reduceat(self._iterations[:rows], first, axis=1)
         else:
             found["iterations"] = self._iterations[:rows]
@@ -168,7 +168,7 @@ class History:
     def _room(self, room: Room | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
         """Return room for the points of a store's first frames in another order, and for their counts."""
         points = (room or Room()).array(name, (store.count(frames), 3), np.float32)
-        return points, np.empty((self._results.n, frames), dtype=np.int64)
+        return points, np.empty((self._n, frames), dtype=np.int64)
 
     def moment_arms(self, frames: int) -> Array:
         """Return −∂l/∂q (frames, K) of the pairs [m], or 1 about a slide."""

@@ -197,7 +197,8 @@ class Results:
         self, rows: int, muscles: NDArray[np.int64] | None = None, dofs: NDArray[np.int64] | None = None
     ) -> History:
         """Return room for `rows` states and frames of the muscles, with the moment arms of pairs (muscles, dofs)."""
-        return History(self, rows, muscles, dofs)
+        tree = self._last_dof, self._dofs[2], self._root
+        return History(self.model, self._plan, tree, self._evaluation, rows, muscles, dofs)
 
     def forces(self, i: int) -> list[tuple[int, Array, Array]]:
         """Return the forces of muscle i at the last evaluation: (body id, point (3,) [m], force (3,) [N]), world."""

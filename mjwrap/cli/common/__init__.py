@@ -1,1 +1,1 @@
-"""What several commands share: arguments, models, output, progress, exit codes."""
+"""Modules that several commands use: arguments, recordings, output, figures, progress, exit codes."""

@@ -1,10 +1,17 @@
-"""Arguments that several commands take, and kinds of arguments: numbers within limits."""
+"""Arguments that several commands take, the settings that they become, and argument types with limits."""
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mjwrap.cli.common.errors import UserError
+from mjwrap.cli.common.recorded import LOCAL, RecordingSettings
+from mjwrap.errors import TableError
+
+HOW = ("rate", "groups", "force_scale")  # only say how it is recorded
 
 
 def add_model(parser: argparse.ArgumentParser, keyframe: str, seed: str) -> None:
@@ -67,6 +74,17 @@ def port(text: str) -> int:
     return number
 
 
+def number(text: str, where: str) -> float:
+    """Return a finite number, or say where it is not one."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise UserError(f"{where}: {text!r} is not a number") from None
+    if not math.isfinite(value):
+        raise UserError(f"{where}: {text} is not finite")
+    return value
+
+
 def add_analysis(add: Callable[..., object]) -> None:
     """Add the option --analysis by a parser's or group's add_argument."""
     add(
@@ -75,3 +93,98 @@ def add_analysis(add: Callable[..., object]) -> None:
         help="lengths, fibre lengths, tensions and moment arms as OpenSim's MuscleAnalysis names them: "
         "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto",
     )
+
+
+def add_json(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the option --json, with a file or without one."""
+    parser.add_argument(
+        "--json",
+        nargs="?",
+        const="-",
+        metavar="FILE.json",
+        help=f"{what}, as JSON; without a file name (or with -) on standard output, in place of the text",
+    )
+
+
+def read_kinds(text: str) -> list[str]:
+    """Return the kinds of numbers in a list such as "length,moment_arm"; `UserError` lists them all."""
+    from mjwrap.runs.run_table import (
+        check_kinds,  # with the muscles, which replaying a recording does not need
+    )
+
+    try:
+        return check_kinds(kind.strip() for kind in text.split(","))
+    except TableError as error:
+        raise UserError(f"--columns: {error}") from None
+
+
+def add_recording(parser: Any, places: Any) -> None:
+    """Add the options of a recording; places: the group of those that exclude each other."""
+    add = parser.add_argument
+    add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
+    places.add_argument(
+        "--connect",
+        nargs="?",
+        const=LOCAL,
+        metavar="URL",
+        help="stream to a viewer that runs: rerun+http://HOST:PORT/proxy, or without an address the one here",
+    )
+    add = parser.add_argument
+    add(
+        "--rate",
+        type=positive,
+        metavar="HZ",
+        help="states per simulated second of its curves (default: every one)",
+    )
+    add("--groups", nargs="+", action="extend", default=[], metavar="NAME=PATTERN,...", help="muscles whose curves "
+        "stand together (* and ? stand for anything; default: those that move the same body)")  # fmt: skip
+    add(
+        "--force-scale",
+        type=positive,
+        metavar="M/N",
+        help="length of its force arrows (default: fits the model)",
+    )
+
+
+def add_serving(parser: Any, places: Any, what: str) -> None:
+    """Add the options that serve a recording to a browser."""
+    places.add_argument(
+        "--serve", action="store_true", help=f"{what} to a browser on this machine until Ctrl-C"
+    )
+    parser.add_argument(
+        "--port",
+        type=port,
+        default=9090,
+        metavar="N",
+        help="where to serve: N and N + 1 (default %(default)s)",
+    )
+
+
+def recording_settings(options: argparse.Namespace, recorded: bool, places: str) -> RecordingSettings:
+    """Return what the options of `add_recording` ask for.
+
+    `UserError` where they say how to record and nothing is recorded, or name a group without patterns. places: the
+    options that would record.
+    """
+    for name in HOW:
+        if getattr(options, name) and not recorded:
+            raise UserError(f"--{name.replace('_', '-')} is for a recording: it goes with {places}")
+    return RecordingSettings(
+        path=options.record,
+        connect=options.connect or "",
+        rate=options.rate,
+        groups=_read_groups(options.groups),
+        force_scale=options.force_scale,
+    )
+
+
+def _read_groups(entries: Sequence[str]) -> dict[str, list[str]] | None:
+    """Return groups of muscles from "NAME=PATTERN,PATTERN"; None where there are no entries."""
+    found: dict[str, list[str]] = {}
+    for entry in entries:
+        name, _, text = entry.partition("=")
+        patterns = [pattern.strip() for pattern in text.split(",")]
+        if not name or not all(patterns):
+            raise UserError(f"--groups '{entry}': write NAME=PATTERN,PATTERN, for example 'flexors=BIC*,BRA'")
+        found.setdefault(name, []).extend(patterns)
+    return found or None

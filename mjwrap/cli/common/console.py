@@ -1,4 +1,4 @@
-"""What every command is run by: its parser, errors in one line, exit codes, quiet libraries."""
+"""Running a command: its parser, errors in one line, exit codes, and warnings of libraries."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from mjwrap.cli.common.output import discard_outputs
 from mjwrap.cli.common.stopping import Stopped, stoppable
 from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
 
-_INPUTS = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
+_SUFFIXES = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
 _MYO_NOISE = (
     "Attaching a spec with an empty prefix"  # myo_sim's models do that; it matters for saving them only
 )
+
+INPUTS = ("model", "file", "excitation", "prescribe", "states", "lengths", "moment_arms")  # name what is read
 
 
 class _Help(argparse.HelpFormatter):
@@ -57,7 +59,9 @@ class Parser(argparse.ArgumentParser):
         given = list(args or [])
         optional = {f: a.const for a in self._actions if a.nargs == "?" for f in a.option_strings}
         for i, (word, following) in enumerate(itertools.pairwise(given)):
-            if word in optional and (following.lower().endswith(_INPUTS) or following.startswith("myo_sim:")):
+            if word in optional and (
+                following.lower().endswith(_SUFFIXES) or following.startswith("myo_sim:")
+            ):
                 given[i] = f"{word}={optional[word]}"
         return super().parse_args(given, namespace)
 
@@ -73,6 +77,13 @@ class Parser(argparse.ArgumentParser):
         if "arguments are required" in message and "--" not in message:
             message += "; it comes before the options, some of which take all words that follow"
         self.exit(USER_ERROR, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def inputs(options: argparse.Namespace) -> Iterator[str]:
+    """Yield what a command's arguments name to be read: files, or what may stand for one."""
+    for option in INPUTS:
+        given = getattr(options, option, None) or []
+        yield from [given] if isinstance(given, str) else given
 
 
 def run(name: str, body: Callable[[], int]) -> int:

@@ -1,4 +1,4 @@
-"""What ends a command early, and its exit codes."""
+"""Exceptions and exit codes of commands."""
 
 FAULTS, RUN_FAILED, USER_ERROR = 1, 1, 2
 

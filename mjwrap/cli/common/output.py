@@ -1,14 +1,13 @@
-"""What a command leaves: output files that appear whole or not at all, and what it says, as text or as JSON."""
+"""Output of commands: files that appear whole or not at all, and a report as text or JSON."""
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from mjwrap.cli.common.errors import RunError, UserError
@@ -17,27 +16,16 @@ from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, uninterrupted
 
 Kept = TypeVar("Kept")
-READ = (
-    "model",
-    "file",
-    "excitation",
-    "prescribe",
-    "states",
-    "lengths",
-    "moment_arms",
-)  # options that name inputs
 _files: list[PartFile] = []  # of the command that runs
 _inputs: set[str] = set()  # resolved paths of the files that it reads
 
 
-def note_inputs(options: argparse.Namespace) -> None:
-    """Remember the files that a command's options name to be read, which no output may take the place of."""
-    for option in READ:
-        given = getattr(options, option, None) or []
-        for entry in [given] if isinstance(given, str) else given:
-            for path in (entry, entry.partition("=")[2]):  # JOINT=FILE
-                if os.path.isfile(path):
-                    _inputs.add(os.path.realpath(path))
+def note_inputs(entries: Iterable[str]) -> None:
+    """Remember the files among the entries (FILE or JOINT=FILE), which no output may take the place of."""
+    for entry in entries:
+        for path in (entry, entry.partition("=")[2]):
+            if os.path.isfile(path):
+                _inputs.add(os.path.realpath(path))
 
 
 def check_unread(path: str, option: str) -> None:
@@ -57,6 +45,11 @@ def open_output(path: str, option: str, *suffixes: str) -> PartFile:
     return file
 
 
+def open_analysis(path: str) -> PartFile:
+    """Return one of the tables of --analysis, as `open_output` does."""
+    return open_output(path, "--analysis", ".sto")
+
+
 def opened(make: Callable[[], Kept]) -> Kept:
     """Return a file, recording or film that has been begun; what is wrong with its place is the user's to mend."""
     try:
@@ -71,17 +64,6 @@ def discard_outputs() -> None:
         file.discard()
     _files.clear()
     _inputs.clear()
-
-
-def add_json(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option --json, with a file or without one."""
-    parser.add_argument(
-        "--json",
-        nargs="?",
-        const="-",
-        metavar="FILE.json",
-        help=f"{what}, as JSON; without a file name (or with -) on standard output, in place of the text",
-    )
 
 
 class Report:

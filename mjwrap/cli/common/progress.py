@@ -1,12 +1,10 @@
-"""While a command works: progress bars, and what has to be there before it begins."""
+"""Progress bars."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
 from typing import Any
-
-from mjwrap.cli.common.errors import UserError
 
 
 def progress_bar(total: float, unit: str, label: str) -> Any:
@@ -48,12 +46,3 @@ class _NoBar:
 
     def close(self) -> None:
         """Do nothing."""
-
-
-def need_matplotlib() -> None:
-    """Raise `UserError` before a run whose plot could not be drawn."""
-    try:
-        import matplotlib
-    except ImportError:
-        raise UserError("--plot needs matplotlib: pip install 'mjwrap[demo]'") from None
-    matplotlib.use("Agg")

@@ -1,4 +1,4 @@
-"""Ctrl-C, kill and a closed terminal: what asks a command to end, and what it then says and returns."""
+"""Stopping a command by Ctrl-C, kill or a closed terminal, and the exit codes for that."""
 
 from __future__ import annotations
 

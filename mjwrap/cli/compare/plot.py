@@ -7,8 +7,8 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from mjwrap.cli.common.figures import save_figure
 from mjwrap.cli.compare.text import TITLES
-from mjwrap.cli.run.plot import save
 from mjwrap.comparison import AGREE, MotionDifference, MuscleSummary, Outcome, PoseComparison
 from mjwrap.files.atomic import PartFile
 
@@ -48,7 +48,7 @@ def plot_comparison(
             draw_sweep(pair, summary, found)
         if motion is not None and motion.difference.size:
             draw_motion(axes[-1], motion)
-    save(figure, output)
+    save_figure(figure, output)
 
 
 def _telling(found: PoseComparison) -> list[MuscleSummary]:

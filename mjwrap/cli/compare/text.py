@@ -126,7 +126,7 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
         say(f"{d.muscle:{wide}}  {d.program:7s}  {what:25s}  {d.rows:6d}{numbers}  {d.time:g}")
 
 
-def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: list[str]) -> None:
+def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: Sequence[str]) -> None:
     """Say how far the two runs drift apart."""
     say(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
     if changed:

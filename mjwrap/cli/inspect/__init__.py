@@ -1,1 +1,1 @@
-"""`mjwrap inspect`: what a model declares."""
+"""`mjwrap inspect`: list the muscles of a model and judge their parameters."""

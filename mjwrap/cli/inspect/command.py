@@ -13,17 +13,10 @@ Examples:
 from __future__ import annotations
 
 import argparse
-import copy
-from typing import Any
 
-from mjwrap import MuscleSystem, implausible, length_ranges
-from mjwrap.calibration.joints import JointSpace
-from mjwrap.cli.common.arguments import add_model
-from mjwrap.cli.common.errors import FAULTS, UserError
-from mjwrap.cli.common.models import load, number, start_keyframe, start_state
-from mjwrap.cli.common.output import Report, add_json
-from mjwrap.cli.inspect.declared import as_values, table
-from mjwrap.text import counted
+from mjwrap.cli.common.arguments import add_json, add_model, number
+from mjwrap.cli.common.errors import UserError
+from mjwrap.cli.inspect.inspecting import InspectSettings, inspect
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,36 +40,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Say what is declared, search, and say what was found."""
-    model = load(options.model)
-    rest = start_state(model, start_keyframe(model, options.keyframe)).qpos
-    joints = dict(read_range(entry) for entry in options.range)
-    if joints and options.quick:
+    """Inspect, and return the exit code."""
+    return inspect(settings(options))
+
+
+def settings(options: argparse.Namespace) -> InspectSettings:
+    """Return what the arguments ask for; `UserError` where they do not fit together."""
+    ranges = dict(_read_range(entry) for entry in options.range)
+    if ranges and options.quick:
         raise UserError("--range is for the joints' ranges, which --quick does not look at")
-    JointSpace(copy.copy(model), rest, joints)  # so that a mistake in a range shows before the work
-    report = Report(options.json)
-    muscles = MuscleSystem(model)
-    if not muscles.names and not muscles.native:
-        raise UserError("the model has no muscles: nothing to inspect")
-    report.say(
-        f"{options.model}: {counted(muscles.n, 'muscle')} along geodesic paths, {len(muscles.native)} with MuJoCo's own"
+    return InspectSettings(
+        model=options.model,
+        keyframe=options.keyframe,
+        seed=options.seed,
+        ranges=ranges,
+        quick=options.quick,
+        strict=options.strict,
+        json=options.json,
     )
-    report.say(table(model, muscles.declarations))
-    for name, reason in muscles.native.items():
-        report.say(f"{name}: stays with MuJoCo: {reason}")
-    ranges = {} if options.quick else length_ranges(muscles, ranges=joints, base=rest, seed=options.seed)
-    found = implausible(muscles, ranges=ranges, rest=rest)
-    report.say(found.table())
-    values: dict[str, Any] = {
-        "model": options.model,
-        "muscles": [as_values(model, muscle) for muscle in muscles.declarations],
-        "native": muscles.native,
-    }
-    report.finish(values | found.as_dict())
-    return FAULTS if options.strict and found.findings else 0
 
 
-def read_range(entry: str) -> tuple[str, tuple[float, float]]:
+def _read_range(entry: str) -> tuple[str, tuple[float, float]]:
     """Return a joint's name and range from "JOINT=LOW,HIGH"."""
     name, _, text = entry.rpartition("=")
     ends = text.split(",")

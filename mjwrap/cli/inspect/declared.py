@@ -1,4 +1,4 @@
-"""What a model declares, as a table and as values."""
+"""The declared muscles of a model, as a table and as values."""
 
 from __future__ import annotations
 

@@ -17,19 +17,21 @@ Examples:
 from __future__ import annotations
 
 import argparse
-import os
-import sys
-import tempfile
 from pathlib import Path
 
-from mjwrap.cli.common.arguments import add_analysis
+from mjwrap.cli.common.arguments import (
+    HOW,
+    add_analysis,
+    add_json,
+    add_recording,
+    add_serving,
+    read_kinds,
+    recording_settings,
+)
 from mjwrap.cli.common.errors import UserError
-from mjwrap.cli.common.output import Report, add_json, say
-from mjwrap.cli.common.recorded import HOW, add_recording, add_serving, check_how, serve_until_stopped
-from mjwrap.errors import RecordingError
-from mjwrap.files.atomic import uninterrupted
-from mjwrap.recording import Summary, open_native, read_summary, serve
-from mjwrap.text import counted
+from mjwrap.cli.replay.settings import ReplaySettings, StatesSettings
+from mjwrap.cli.replay.showing import replay
+from mjwrap.files import SUFFIXES
 
 COLUMNS = "length,velocity,tension"  # of a table, unless others are asked for
 
@@ -53,39 +55,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Look at the whole file first, so that a damaged one is an error here and not an empty viewer."""
-    try:
-        if Path(options.file).suffix.lower() in (".sto", ".mot", ".csv", ".npz"):
-            return replay_states(options)
-        for option in ("model", "keyframe", "record", "connect", *HOW, "out", "analysis"):
-            if getattr(options, option):
-                raise UserError(
-                    f"--{option.replace('_', '-')} goes with a table of states, and '{options.file}' is none"
-                )
-        return show(options, options.file)
-    except RecordingError as error:
-        raise UserError(str(error)) from None
+    """Show, record or describe a file, and return the exit code."""
+    return replay(settings(options))
 
 
-def show(options: argparse.Namespace, path: str) -> int:
-    """Say what a recording holds, or show it."""
-    summary = read_summary(path)
-    if options.info or options.json:
-        report = Report(options.json)
-        report.say(describe(summary))
-        report.finish({name: str(x) if isinstance(x, Path) else x for name, x in vars(summary).items()})
-        return 0
-    if options.serve or not has_display():
-        with uninterrupted():
-            server = serve(path, options.port)
-        return serve_until_stopped(server, lambda: say(f"open {server.address}\nCtrl-C stops serving"))
-    return open_native(path)
+def settings(options: argparse.Namespace) -> ReplaySettings:
+    """Return what the arguments ask for; `UserError` where they do not fit together."""
+    is_table = Path(options.file).suffix.lower() in SUFFIXES
+    for option in () if is_table else ("model", "keyframe", "record", "connect", *HOW, "out", "analysis"):
+        if getattr(options, option):
+            raise UserError(
+                f"--{option.replace('_', '-')} goes with a table of states, and '{options.file}' is none"
+            )
+    return ReplaySettings(
+        file=options.file,
+        states=_states(options) if is_table else None,
+        serve=options.serve,
+        port=options.port,
+        info=options.info,
+        json=options.json,
+    )
 
 
-def replay_states(options: argparse.Namespace) -> int:
-    """Record what the states of a table look like, and show it, unless it is only to be kept."""
-    from mjwrap.cli.replay.states import recompute
-
+def _states(options: argparse.Namespace) -> StatesSettings:
     if not options.model:
         raise UserError(f"'{options.file}' is a table of states: --model says of which model")
     if options.columns != COLUMNS and not options.out:
@@ -96,30 +88,13 @@ def replay_states(options: argparse.Namespace) -> int:
             "--serve is for what is not kept: leave --record, --connect, --out and --analysis away, or replay the "
             "recording"
         )
-    if kept or options.info or options.json:
-        check_how(options, bool(options.record or options.connect), "--record or --connect")
-        recompute(options, options.record)
-        return 0
-    with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:
-        path = os.path.join(folder, f"{Path(options.file).stem}.rrd")
-        recompute(options, path)
-        return show(options, path)
-
-
-def describe(summary: Summary) -> str:
-    """What a recording holds, a fact a line."""
-    lines = [
-        f"file      {summary.path} ({summary.path.stat().st_size / 1e6:.1f} MB)",
-        f"model     {summary.model}",
-        f"time      {summary.start:g} s to {summary.end:g} s, {counted(summary.states, 'state')}",
-        f"muscles   {len(summary.muscles)}: {', '.join(summary.muscles)}",
-        f"entities  {len(summary.entities)}:",
-    ]
-    return "\n".join(lines + [f"    {path}" for path in summary.entities])
-
-
-def has_display() -> bool:
-    """Whether a window can be opened."""
-    return sys.platform in ("darwin", "win32") or any(
-        os.environ.get(v) for v in ("DISPLAY", "WAYLAND_DISPLAY")
+    # what is neither kept nor only described is recorded for the viewer
+    recorded = bool(options.record or options.connect) or not (kept or options.info or options.json)
+    return StatesSettings(
+        model=options.model,
+        keyframe=options.keyframe,
+        recording=recording_settings(options, recorded, "--record or --connect"),
+        table=options.out,
+        kinds=read_kinds(options.columns),
+        analysis=options.analysis,
     )

@@ -1,77 +1,114 @@
-"""The files that a run leaves: tables, plot, recording and film, each opened before it and completed after it."""
+"""The files of a run: tables, plot, recording and film, each opened before it and completed after it."""
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import mujoco
-
-from mjwrap.cli.common.output import open_output, opened
-from mjwrap.cli.common.progress import need_matplotlib
-from mjwrap.cli.common.recorded import open_recorder
-from mjwrap.cli.run.analysis import Analysis
-from mjwrap.cli.run.engine import Engine, PluginEngine
-from mjwrap.cli.run.history import History
-from mjwrap.cli.run.samples import Samples, choose_kinds
+from mjwrap.cli.common.figures import need_matplotlib
+from mjwrap.cli.common.output import open_analysis, open_output, opened
+from mjwrap.cli.common.recorded import RecordingSettings, open_recorder
 from mjwrap.files import SUFFIXES
+from mjwrap.runs.engine import Engine, PluginEngine
+from mjwrap.runs.muscle_analysis_tables import MuscleAnalysisTables
+from mjwrap.runs.plot_history import PlotHistory
+from mjwrap.runs.run_table import DEFAULT_KINDS, RunTableFile
+from mjwrap.runs.simulation import Log
 
-Log = Callable[[mujoco.MjData], object]
-OUTPUTS = (("recording", "record"), ("video", "video"), ("plot", "plot"), ("csv", "csv"), ("table", "out"),
-           ("analysis", "analysis"))  # fmt: skip
+
+@dataclass(frozen=True)
+class FilmSettings:
+    """A film of a run, as `Video` takes it: width and height [pixels], frames a second, speed, camera."""
+
+    path: str
+    width: int
+    height: int
+    fps: float
+    speed: float
+    camera: str | None
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """The files that a run is to leave; None for those that were not asked for.
+
+    kinds: which numbers the tables (csv and table) hold. analysis: the prefix of tables in OpenSim's layout.
+    """
+
+    recording: RecordingSettings
+    film: FilmSettings | None = None
+    plot: str | None = None
+    csv: str | None = None
+    table: str | None = None
+    kinds: Sequence[str] = DEFAULT_KINDS
+    analysis: str | None = None
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The places that were asked for, by what goes there."""
+        places = {
+            "recording": self.recording.path,
+            "video": self.film.path if self.film else None,
+            "plot": self.plot,
+            "csv": self.csv,
+            "table": self.table,
+            "analysis": self.analysis,
+        }
+        return {what: path for what, path in places.items() if path}
 
 
 def open_outputs(
-    options: argparse.Namespace, engine: Engine, stack: contextlib.ExitStack, connect: str
+    settings: OutputSettings, source: str, engine: Engine, stack: contextlib.ExitStack
 ) -> tuple[list[Log], list[Callable[[], None]]]:
-    """Open every file that was asked for: what to call at each sample, and what at the end.
+    """Open every file that was asked for; return what to call at each sample, and what at the end.
 
-    A place that cannot be written shows here, before the run. What has to be closed in any case goes on `stack`.
-    connect: the viewer for browsers that a recording goes to, if there is one.
+    A place that cannot be written is a `UserError` here, before the run. What has to be closed in any case goes on
+    `stack`. source: the model's file or name, for the title of the plot.
     """
     model, muscles = engine.muscles.model, engine.muscles
     logs: list[Log] = []
     closes: list[Callable[[], None]] = []
-    kinds = choose_kinds(options.columns)
-    plot = open_output(options.plot, "--plot", ".png", ".pdf", ".svg") if options.plot else None
-    tables = [open_output(options.csv, "--csv", ".csv")] if options.csv else []
-    tables += [open_output(options.out, "--out", *SUFFIXES)] if options.out else []
+    plot = open_output(settings.plot, "--plot", ".png", ".pdf", ".svg") if settings.plot else None
+    tables = [open_output(settings.csv, "--csv", ".csv")] if settings.csv else []
+    tables += [open_output(settings.table, "--out", *SUFFIXES)] if settings.table else []
     if plot is not None:
         need_matplotlib()
     for output in tables:
-        samples = Samples(output, model, muscles, kinds)
-        logs.append(samples.log)
-        closes.append(samples.close)
-    if options.analysis:
-        analysis = Analysis(options.analysis, model, muscles)
+        table = RunTableFile(output, model, muscles, settings.kinds)
+        logs.append(table.log)
+        closes.append(table.close)
+    if settings.analysis:
+        analysis = MuscleAnalysisTables(settings.analysis, model, muscles, open_analysis)
         logs.append(analysis.log)
         closes.append(analysis.close)
-    connect = connect or options.connect or ""
-    if options.record or connect:
-        logs.append(open_recorder(options, model, muscles, stack, options.record, connect).log)
-    if isinstance(engine, PluginEngine) and options.video:
-        from mjwrap import Video  # with MuJoCo's renderer
-
-        width, height = options.video_size
-        film = stack.enter_context(
-            opened(
-                lambda: Video(
-                    engine.model, options.video, fps=options.fps, speed=options.speed, width=width,
-                    height=height, camera=options.camera,
-                )
-            )
-        )  # fmt: skip
-        logs.append(lambda _: film.log(engine.fresh()))
+    if settings.recording.wanted:
+        logs.append(open_recorder(settings.recording, model, muscles, stack).log)
+    if isinstance(engine, PluginEngine) and settings.film:
+        logs.append(_open_film(settings.film, engine, stack))
     if plot is not None:
-        history = History(muscles)
+        history = PlotHistory(muscles)
         logs.append(history.log)
 
         def draw() -> None:
             from mjwrap.cli.run.plot import plot_run
 
-            plot_run(plot, f"{Path(options.model).name}, {engine.data.time:.4g} s", model, muscles, history)
+            plot_run(plot, f"{Path(source).name}, {engine.data.time:.4g} s", model, muscles, history)
 
         closes.append(draw)
     return logs, closes
+
+
+def _open_film(film: FilmSettings, engine: PluginEngine, stack: contextlib.ExitStack) -> Log:
+    from mjwrap import Video  # with MuJoCo's renderer
+
+    video = stack.enter_context(
+        opened(
+            lambda: Video(
+                engine.model, film.path, fps=film.fps, speed=film.speed, width=film.width, height=film.height,
+                camera=film.camera,
+            )
+        )
+    )  # fmt: skip
+    return lambda _: video.log(engine.fresh())

@@ -11,9 +11,10 @@ from matplotlib.colors import Normalize, PowerNorm
 from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
-from mjwrap.cli.run.history import History
+from mjwrap.cli.common.figures import save_figure
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import name_of
+from mjwrap.runs.plot_history import PlotHistory
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ _STYLES = ("-", "--", ":")
 
 
 def plot_run(
-    output: PartFile, title: str, model: mujoco.MjModel, muscles: MuscleSystem, history: History
+    output: PartFile, title: str, model: mujoco.MjModel, muscles: MuscleSystem, history: PlotHistory
 ) -> None:
     """Draw a run and give the file its name."""
     many = muscles.n > LINES
@@ -51,15 +52,7 @@ def plot_run(
     axes[-1, 0].set_xlabel("time [s]")
     axes[-1, 0].set_xlim(time[0], max(time[-1], time[0] + 1e-9))
     figure.suptitle(title, fontsize=11)
-    save(figure, output)
-
-
-def save(figure: Any, output: PartFile) -> None:
-    """Write a figure and give the file its name."""
-    with output.writing():
-        figure.savefig(output.part, dpi=110)
-    plt.close(figure)
-    output.publish()
+    save_figure(figure, output)
 
 
 def _joints(model: mujoco.MjModel, qpos: Array) -> tuple[dict[str, Array], dict[str, Array], int]:
@@ -95,7 +88,7 @@ def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str, wide: b
 
 
 def _muscle_panel(
-    figure: Any, axis: Any, time: Array, panel: str, muscles: MuscleSystem, history: History, many: bool
+    figure: Any, axis: Any, time: Array, panel: str, muscles: MuscleSystem, history: PlotHistory, many: bool
 ) -> None:
     values = history.column({"activation": 2, "length": 3, "tension": 4}[panel])
     label = {"activation": "activation", "length": "length [mm]", "tension": "tension [N]"}[panel]

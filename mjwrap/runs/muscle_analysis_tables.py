@@ -9,12 +9,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem
-from mjwrap.cli.common.output import open_output
-from mjwrap.cli.run.samples import spanned
 from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import dof_names
+from mjwrap.runs.run_table import spanned
+from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 
@@ -27,16 +26,24 @@ class _Part(NamedTuple):
     read: Callable[[Array], Array]
 
 
-class Analysis:
+class MuscleAnalysisTables:
     """Writes a row into every file for every sample.
 
     Length, FiberLength (of muscles whose law has fibres) and TendonForce; MomentArm_JOINT, −∂l/∂q, for every degree
-    of freedom that a muscle spans, 0 for muscles that do not span it. SI units. `UserError` for a place that cannot be
-    written.
+    of freedom that a muscle spans, 0 for muscles that do not span it. SI units. The files are called
+    PREFIX_MuscleAnalysis_QUANTITY.sto. open_file: makes the `PartFile` for such a name; `RecordingError` for a place
+    that cannot be written.
     """
 
-    def __init__(self, prefix: str, model: mujoco.MjModel, muscles: MuscleSystem) -> None:
+    def __init__(
+        self,
+        prefix: str,
+        model: mujoco.MjModel,
+        muscles: MuscleSystem,
+        open_file: Callable[[str], PartFile] = lambda path: PartFile(path, ".sto"),
+    ) -> None:
         self._muscles = muscles
+        self._open = open_file
         self._parts: list[_Part] = []
         names, dofs = muscles.names, dof_names(model)
         fibers = [i for i, m in enumerate(muscles.declarations) if hasattr(m.parameters, "tendon")]
@@ -51,7 +58,7 @@ class Analysis:
 
     def _add(self, prefix: str, quantity: str, names: list[str], read: Callable[[Array], Array]) -> None:
         path = f"{prefix}_MuscleAnalysis_{quantity.replace('/', '_')}.sto"
-        output = open_output(path, "--analysis", ".sto")
+        output = self._open(path)
         with output.writing():
             writer = RowWriter(output.open_text(), ".sto", names, {"header": quantity})
         self._parts.append(_Part(output, writer, read))

@@ -1,4 +1,4 @@
-"""As many samples of a run as a plot can show."""
+"""The samples of a run that a plot needs."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem
+from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 MOST = 4000  # samples that a plot keeps; every second one goes when there are more
 
 
-class History:
+class PlotHistory:
     """Samples for a plot, (T, ...) each: time, qpos, activation, length, tension."""
 
     def __init__(self, muscles: MuscleSystem) -> None:

@@ -10,12 +10,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem, Table
-from mjwrap.cli.common.errors import UserError
-from mjwrap.cli.common.models import single_joints
-from mjwrap.cli.run.samples import MUSCLE_KINDS
+from mjwrap.errors import TableError
+from mjwrap.files import Table
 from mjwrap.mjcf import act_names, dof_names, qpos_names
 from mjwrap.runs.excitation import control_names
+from mjwrap.runs.models import single_joints
+from mjwrap.runs.run_table import MUSCLE_KINDS
+from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -70,7 +71,7 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
     `mjwrap run` writes them; "qpos[3]" by number; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
     "MUSCLE/fiber_length" as in OpenSim's files, with the path before them or without. "act" counts before what else
     says the same. Rotations are in rad, or in degrees where the header says so. Without velocities they are the
-    differences of the positions. `UserError` where no column names a joint, and for arrays of another model's size.
+    differences of the positions. `TableError` where no column names a joint, and for arrays of another model's size.
     """
     reader = _Reader(model, muscles, start, table)
     reader.check_widths()
@@ -78,7 +79,7 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
         reader.take(column)
     if not reader.found["qpos"]:
         known = ", ".join(qpos_names(model)) or "none"
-        raise UserError(f"'{table.source}': no column names a joint; the model has: {known}")
+        raise TableError(f"'{table.source}': no column names a joint; the model has: {known}")
     return reader.states()
 
 
@@ -116,13 +117,13 @@ class _Reader:
                 self._places["fiber_length"][muscle.name] = array, first + 1
 
     def check_widths(self) -> None:
-        """Raise `UserError` where an array has more columns than the model's, or, in an NPZ file, fewer."""
+        """Raise `TableError` where an array has more columns than the model's, or, in an NPZ file, fewer."""
         for kind, names in self.names.items():
             given = [int(m[1]) for m in (re.fullmatch(rf"{kind}\[(\d+)\]", n) for n in self.table.names) if m]
             count = max(given) + 1 if given else int(kind in self.table.names)
             whole = self.table.source.lower().endswith(".npz")
             if count > len(names) or (count and whole and count != len(names)):
-                raise UserError(
+                raise TableError(
                     f"'{self.table.source}': {kind} has {counted(count, 'column')}, the model {len(names)}: "
                     f"{_few(names) or 'none'}"
                 )

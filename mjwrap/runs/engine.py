@@ -1,4 +1,4 @@
-"""What moves a model in a run: `MuscleSystem` step by step, or the engine plugin inside MuJoCo."""
+"""The engine of a run: `MuscleSystem` step by step, or the engine plugin inside MuJoCo."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from typing import Protocol
 
 import mujoco
 
-from mjwrap import MuscleSystem, Status
-from mjwrap.cli.common.models import load, load_spec
-from mjwrap.cli.run.states import put_own
-from mjwrap.errors import PathError, StateError
+from mjwrap.errors import ModelError, PathError, StateError
+from mjwrap.paths import Status
+from mjwrap.runs.models import load, load_spec
+from mjwrap.runs.state_tables import put_own
+from mjwrap.system import MuscleSystem
 from mjwrap.system.checks import resets
 from mjwrap.text import counted
 
@@ -122,5 +123,11 @@ class PluginEngine:
 
 
 def start_engine(source: str, mode: str, strict: bool) -> Engine:
-    """Return what moves a model in a mode: "python", or a mode of the plugin's `install`."""
+    """Return the engine for a model (a file, or "myo_sim:NAME") in one of `MODES`.
+
+    "python" is `MuscleSystem`; the others are modes of the plugin's `install`. strict: raise `PathError` at the first
+    step at which a muscle has no path.
+    """
+    if mode not in MODES:
+        raise ModelError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
     return PythonEngine(source, strict) if mode == "python" else PluginEngine(source, mode, strict)

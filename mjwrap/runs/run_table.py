@@ -1,26 +1,26 @@
-"""The table that a run leaves: which numbers, what they are called, and the file that they go to."""
+"""The table of a run: its columns, and writing it row by row."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem, Table
-from mjwrap.cli.common.errors import UserError
-from mjwrap.files import RowWriter
+from mjwrap.errors import TableError
+from mjwrap.files import RowWriter, Table
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.writing import save_npz
 from mjwrap.mjcf import MuscleDeclaration, act_names, dof_names, qpos_names
 from mjwrap.runs.excitation import control_names
+from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 MUSCLE_KINDS = ("activation", "fiber_length", "length", "velocity", "tension")
 KINDS = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS, "moment_arm")
-USUAL = "qpos,qvel,act,ctrl,activation,fiber_length,length,velocity,tension"
+DEFAULT_KINDS = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS)
 
 
 class Column(NamedTuple):
@@ -30,13 +30,13 @@ class Column(NamedTuple):
     read: Callable[[mujoco.MjData], Array]
 
 
-def choose_kinds(text: str) -> list[str]:
-    """Return the kinds of numbers in a list such as "length,moment_arm"; `UserError` lists them all."""
-    kinds = [kind.strip() for kind in text.split(",")]
-    for kind in kinds:
+def check_kinds(kinds: Iterable[str]) -> list[str]:
+    """Return kinds of numbers, each once; `TableError` for an unknown one lists `KINDS`."""
+    found = list(dict.fromkeys(kinds))
+    for kind in found:
         if kind not in KINDS:
-            raise UserError(f"--columns: no kind '{kind}'; kinds: {', '.join(KINDS)}")
-    return list(dict.fromkeys(kinds))
+            raise TableError(f"no kind '{kind}'; kinds: {', '.join(KINDS)}")
+    return found
 
 
 def columns(model: mujoco.MjModel, muscles: MuscleSystem, kinds: Sequence[str]) -> list[Column]:
@@ -90,28 +90,57 @@ def _chain(model: mujoco.MjModel, body: int) -> set[int]:
     return found
 
 
-class Samples:
-    """Writes a row for every sample: text as the run goes on, so that a long run needs no memory; NPZ at the end."""
+class RunTable:
+    """Collects a row for every sample of a run, in memory.
+
+    kinds: of `KINDS`, whose columns `columns` describes. `TableError` for an unknown kind.
+    """
 
     def __init__(
-        self, output: PartFile, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Sequence[str]
+        self, model: mujoco.MjModel, muscles: MuscleSystem, kinds: Iterable[str] = DEFAULT_KINDS
     ) -> None:
-        self._output = output
-        self._columns = columns(model, muscles, kinds)
-        self._names = [name for column in self._columns for name in column.names]
+        self._columns = columns(model, muscles, check_kinds(kinds))
+        self.names = tuple(name for column in self._columns for name in column.names)
         self._kept: list[tuple[float, Array]] = []
+
+    def log(self, data: mujoco.MjData) -> None:
+        """Keep the present state; the muscles must have been evaluated at it."""
+        self._kept.append((float(data.time), self._row(data)))
+
+    def _row(self, data: mujoco.MjData) -> Array:
+        return np.concatenate([np.empty(0), *(column.read(data) for column in self._columns)])
+
+    def table(self) -> Table:
+        """Return what was kept."""
+        times = np.array([time for time, _ in self._kept])
+        rows = np.array([row for _, row in self._kept]).reshape(len(times), len(self.names))
+        return Table(times, self.names, rows)
+
+
+class RunTableFile(RunTable):
+    """Writes a `RunTable` to a file: text as the run goes on, so that a long run needs no memory; NPZ at the end."""
+
+    def __init__(
+        self,
+        output: PartFile,
+        model: mujoco.MjModel,
+        muscles: MuscleSystem,
+        kinds: Iterable[str] = DEFAULT_KINDS,
+    ) -> None:
+        super().__init__(model, muscles, kinds)
+        self._output = output
         self._writer: RowWriter | None = None
         suffix = output.path.suffix.lower()
         if suffix != ".npz":
             with output.writing():
-                self._writer = RowWriter(output.open_text(), suffix, self._names)
+                self._writer = RowWriter(output.open_text(), suffix, self.names)
 
     def log(self, data: mujoco.MjData) -> None:
-        """Write the present state."""
-        row = np.concatenate([np.empty(0), *(column.read(data) for column in self._columns)])
+        """Write the present state; the muscles must have been evaluated at it."""
         if self._writer is None:
-            self._kept.append((float(data.time), row))
+            super().log(data)
             return
+        row = self._row(data)
         with self._output.writing():
             self._writer.add(data.time, row)
 
@@ -121,7 +150,5 @@ class Samples:
             if self._writer is not None:
                 self._writer.finish()
             else:
-                times = np.array([time for time, _ in self._kept])
-                rows = np.array([row for _, row in self._kept]).reshape(len(times), len(self._names))
-                save_npz(self._output.part, Table(times, tuple(self._names), rows))
+                save_npz(self._output.part, self.table())
         self._output.publish()

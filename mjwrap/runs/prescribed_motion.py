@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.cli.common.errors import UserError
-from mjwrap.cli.common.models import find_joint, single_joints
 from mjwrap.errors import SignalError
 from mjwrap.files import SUFFIXES, read_table
+from mjwrap.runs.models import find_joint, single_joints
 from mjwrap.runs.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
 
 Array = NDArray[np.float64]
@@ -47,15 +46,16 @@ class Spline:
         return self._at(t, 1)
 
 
-class Prescribed:
+class PrescribedMotion:
     """The prescribed joints of a run.
 
     entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
     column for each joint. Positions in rad or m, or in degrees where the table's header says so. The joints' armature
-    is changed in `model`.
+    is changed in `model`. option: what the entries were given by, for messages. `SignalError` or `ModelError` for an
+    entry that cannot be used.
     """
 
-    def __init__(self, model: mujoco.MjModel, entries: Sequence[str]) -> None:
+    def __init__(self, model: mujoco.MjModel, entries: Sequence[str], *, option: str = "") -> None:
         self._model = model
         found: dict[int, SmoothSignal] = {}
         for entry in entries:
@@ -63,8 +63,9 @@ class Prescribed:
             equals = equals and not Path(entry).is_file()
             if not equals and Path(entry).suffix.lower() not in SUFFIXES:
                 known = ", ".join(single_joints(model)) or "none"
-                raise UserError(
-                    f"--prescribe '{entry}': write JOINT=PATTERN, such as knee=sine:0.5,1, or name a table "
+                named = f"{option} '{entry}'".lstrip()
+                raise SignalError(
+                    f"{named}: write JOINT=PATTERN, such as knee=sine:0.5,1, or name a table "
                     f"({', '.join(SUFFIXES)}); joints: {known}"
                 )
             if equals:
@@ -110,8 +111,9 @@ def _smooth(name: str, pattern: str) -> SmoothSignal:
     return signal
 
 
-def check_free(joints: Sequence[int], positions: Sequence[str], model: mujoco.MjModel) -> None:
-    """Raise `UserError` where a start position is given for a joint that is prescribed."""
-    for entry in positions:
-        if find_joint(model, entry.rpartition("=")[0], entry) in joints:
-            raise UserError(f"'{entry}': this joint's position is prescribed")
+def check_free(model: mujoco.MjModel, joints: Sequence[int], positions: Mapping[str, float]) -> None:
+    """Raise `SignalError` where a start position [rad, m] is given for a joint (by id) that is prescribed."""
+    for name, value in positions.items():
+        entry = f"{name}={value:g}"
+        if find_joint(model, name, entry) in joints:
+            raise SignalError(f"'{entry}': this joint's position is prescribed")

@@ -1,0 +1,175 @@
+"""Compare MuJoCo's tendons with mjwrap's paths, and report as text, values, plot, page and tables."""
+
+from __future__ import annotations
+
+import contextlib
+import fnmatch
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from mjwrap import MuscleSystem, Table, read_table
+from mjwrap.cli.common.errors import FAULTS, UserError
+from mjwrap.cli.common.figures import need_matplotlib
+from mjwrap.cli.common.output import Report, open_output
+from mjwrap.cli.common.progress import Stages
+from mjwrap.cli.compare.rows import PoseRows, write_tables
+from mjwrap.cli.compare.text import as_values, tell_motion, tell_poses, tell_tables
+from mjwrap.comparison import (
+    PoseComparison,
+    compare_motion,
+    compare_poses,
+    compare_tables,
+    verdict,
+    with_native_laws,
+)
+from mjwrap.comparison.tables import Beside
+from mjwrap.mjcf import dof_names
+from mjwrap.runs.excitation import Excitation
+from mjwrap.runs.models import load, start_keyframe, start_state
+from mjwrap.runs.state_tables import read_states
+from mjwrap.text import counted
+
+
+@dataclass(frozen=True)
+class GivenTables:
+    """Files of another program: states of a motion, lengths there, and moment arms there by joint."""
+
+    states: str
+    lengths: str | None
+    moment_arms: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class CompareSettings:
+    """The settings of `mjwrap compare`.
+
+    model: a file, or "myo_sim:NAME". keyframe: the start pose, None for qpos0. muscles: patterns of names, None for
+    all. samples: poses of a sweep, and random ones; bases: further poses to sweep around. duration: of the motion [s],
+    0 for none; excitation in it, as `Excitation` takes it. law: "mujoco" runs both with MuJoCo's curves, "declared"
+    mjwrap with the declared law. plot, page, csv, json: files, or None; json may be "-" for standard output. csv_all: a
+    row for every pose. check: exit code 1 where mjwrap is not right. command: the line that makes this comparison.
+    """
+
+    model: str
+    keyframe: str | None
+    seed: int
+    muscles: Sequence[str] | None
+    samples: int
+    bases: int
+    duration: float
+    excitation: Sequence[str]
+    law: str
+    given: GivenTables | None
+    plot: str | None
+    page: str | None
+    csv: str | None
+    csv_all: bool
+    json: str | None
+    check: bool
+    command: str
+
+
+def compare(settings: CompareSettings) -> int:
+    """Compare, and say and write what came of it; return the exit code."""
+    model = load(settings.model)
+    key = start_keyframe(model, settings.keyframe)
+    start = start_state(model, key)
+    muscles = MuscleSystem(model)
+    names = choose(muscles, settings.muscles)
+    Excitation(muscles, settings.excitation, settings.seed)  # so that a mistake in it shows before the work
+    plot = open_output(settings.plot, "--plot", ".png", ".pdf", ".svg") if settings.plot else None
+    page = open_output(settings.page, "--report", ".html", ".htm") if settings.page else None
+    table = open_output(settings.csv, "--csv", ".csv") if settings.csv else None
+    report = Report(settings.json)
+    given = read_tables(settings.given, model, muscles, start) if settings.given else None
+    if plot is not None or page is not None:
+        need_matplotlib()
+    beside: list[Beside] = []
+    tables = compare_tables(model, *given, each=beside.append) if given is not None else []
+    if settings.csv and given is not None:
+        write_tables(open_output(tables_path(settings.csv), "--csv", ".csv"), beside)
+    rows = PoseRows(table, dof_names(model), settings.csv_all) if table is not None else None
+    found = compare_all(model, names, settings, start, rows)
+    verdicts = {
+        name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
+        for name, summary in found.muscles.items()
+    }
+    report.say(
+        f"{settings.model}: {counted(len(found.muscles), 'muscle')} at {counted(found.poses, 'pose')} each"
+    )
+    tell_poses(report.say, found, verdicts)
+    told = {"csv": f" ({rows.close()})"} if rows is not None else {}
+
+    tell_tables(report.say, tables)
+    motion = None
+    if settings.duration > 0.0 and not model.nv:
+        report.say("\nno motion: the model has no joint")
+    elif settings.duration > 0.0:
+        moved, changed = with_native_laws(model) if settings.law == "mujoco" else (model, [])
+        motion = compare_motion(moved, settings.excitation, settings.duration, key=key, seed=settings.seed)
+        tell_motion(report.say, motion, changed, settings.excitation)
+    if plot is not None:
+        from mjwrap.cli.compare.plot import plot_comparison
+
+        title = f"{Path(settings.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
+        plot_comparison(plot, title, found, motion)
+    if page is not None:
+        from mjwrap.cli.compare.page import write_page
+
+        write_page(page, settings.model, settings.command, found, verdicts, motion, tables)
+    files = {"plot": settings.plot, "report": settings.page, "csv": settings.csv}
+    if settings.csv and given is not None:
+        files["tables"] = tables_path(settings.csv)
+    for what, path in files.items():
+        if path:
+            report.say(f"{what + ':':10s} {path}{told.get(what, '')}")
+    asked = {name: getattr(settings, name) for name in ("model", "samples", "bases", "seed")}
+    report.finish({**asked, **as_values(found, verdicts, motion), "tables": [vars(d) for d in tables]})
+    wrong = found.at_fault or any(jump.program == "mjwrap" for jump in found.jumps)
+    return FAULTS if settings.check and wrong else 0
+
+
+def tables_path(path: str) -> str:
+    """Return the name of the file beside `--csv` that the given tables go to."""
+    return str(Path(path).with_name(f"{Path(path).stem}_tables.csv"))
+
+
+def read_tables(
+    given: GivenTables, model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjData
+) -> tuple[Any, Any, Table | None, dict[str, Table]]:
+    """Return times (T,) [s] and qpos (T, nq) of the given motion, lengths, and moment arms by joint."""
+    states = read_states(model, muscles, start, read_table(given.states))
+    arms = {joint: read_table(file) for joint, file in given.moment_arms.items()}
+    return states.time, states.qpos, read_table(given.lengths) if given.lengths else None, arms
+
+
+def compare_all(
+    model: mujoco.MjModel, names: list[str] | None, settings: CompareSettings, start: mujoco.MjData,
+    rows: PoseRows | None,
+) -> PoseComparison:  # fmt: skip
+    """Compare at all poses, with a progress bar."""
+    with contextlib.closing(Stages("motions", "comparing")) as progress:
+        return compare_poses(
+            model, names=names, samples=settings.samples, bases=settings.bases, seed=settings.seed,
+            base=start.qpos, each=rows.add if rows is not None else None, progress=progress,
+        )  # fmt: skip
+
+
+def choose(muscles: MuscleSystem, wanted: Sequence[str] | None) -> list[str] | None:
+    """Return the names of the muscles that the patterns `wanted` match, None for all."""
+    known = [*muscles.names, *muscles.native]
+    if not known:
+        raise UserError("the model has no muscles: nothing to compare")
+    if wanted is None:
+        return None
+    found: list[str] = []
+    for pattern in wanted:
+        fit = [name for name in fnmatch.filter(known, pattern) if name not in found]
+        if not fit and pattern not in found:
+            raise UserError(f"no muscle '{pattern}'; muscles: {', '.join(known)}")
+        found += fit
+    return found

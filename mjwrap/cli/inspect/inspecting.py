@@ -1,0 +1,63 @@
+"""Inspect a model: list its muscles, and judge their parameters over the joints' ranges."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mjwrap import MuscleSystem, implausible, length_ranges
+from mjwrap.calibration.joints import JointSpace
+from mjwrap.cli.common.errors import FAULTS, UserError
+from mjwrap.cli.common.output import Report
+from mjwrap.cli.inspect.declared import as_values, table
+from mjwrap.runs.models import load, start_keyframe, start_state
+from mjwrap.text import counted
+
+
+@dataclass(frozen=True)
+class InspectSettings:
+    """The settings of `mjwrap inspect`.
+
+    model: a file, or "myo_sim:NAME". keyframe: the rest pose, None for qpos0. seed: of the drawn poses. ranges: of
+    joints by name, instead of the model's [rad, m]. quick: judge the parameters and the rest pose only. strict: exit
+    code 1 where something is implausible. json: a file for the report as values, "-" for standard output, or None.
+    """
+
+    model: str
+    keyframe: str | None
+    seed: int
+    ranges: Mapping[str, tuple[float, float]]
+    quick: bool
+    strict: bool
+    json: str | None
+
+
+def inspect(settings: InspectSettings) -> int:
+    """Say what is declared, search, and say what was found; return the exit code."""
+    model = load(settings.model)
+    rest = start_state(model, start_keyframe(model, settings.keyframe)).qpos
+    joints = dict(settings.ranges)
+    JointSpace(copy.copy(model), rest, joints)  # so that a mistake in a range shows before the work
+    report = Report(settings.json)
+    muscles = MuscleSystem(model)
+    if not muscles.names and not muscles.native:
+        raise UserError("the model has no muscles: nothing to inspect")
+    report.say(
+        f"{settings.model}: {counted(muscles.n, 'muscle')} along geodesic paths, "
+        f"{len(muscles.native)} with MuJoCo's own"
+    )
+    report.say(table(model, muscles.declarations))
+    for name, reason in muscles.native.items():
+        report.say(f"{name}: stays with MuJoCo: {reason}")
+    ranges = {} if settings.quick else length_ranges(muscles, ranges=joints, base=rest, seed=settings.seed)
+    found = implausible(muscles, ranges=ranges, rest=rest)
+    report.say(found.table())
+    values: dict[str, Any] = {
+        "model": settings.model,
+        "muscles": [as_values(model, muscle) for muscle in muscles.declarations],
+        "native": muscles.native,
+    }
+    report.finish(values | found.as_dict())
+    return FAULTS if settings.strict and found.findings else 0

@@ -1,0 +1,45 @@
+"""The settings of `mjwrap replay`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mjwrap.cli.common.recorded import RecordingSettings
+
+
+@dataclass(frozen=True)
+class StatesSettings:
+    """What to do with a table of states.
+
+    model: a file, or "myo_sim:NAME". keyframe: gives what the table does not name, None for qpos0. table: a file for
+    numbers of some kinds, or None. analysis: the prefix of tables in OpenSim's layout, or None.
+    """
+
+    model: str
+    keyframe: str | None
+    recording: RecordingSettings
+    table: str | None = None
+    kinds: Sequence[str] = ()
+    analysis: str | None = None
+
+    @property
+    def kept(self) -> bool:
+        """Whether anything is to stay."""
+        return bool(self.recording.wanted or self.table or self.analysis)
+
+
+@dataclass(frozen=True)
+class ReplaySettings:
+    """The settings of `mjwrap replay`.
+
+    file: a recording, or a table of states, for which there are `states`. serve: show it in a browser, at `port`.
+    info: describe it only. json: the file that the description goes to as values, "-" for standard output, or None.
+    """
+
+    file: str
+    states: StatesSettings | None
+    serve: bool
+    port: int
+    info: bool = False
+    json: str | None = None

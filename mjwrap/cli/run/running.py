@@ -1,0 +1,140 @@
+"""Run a model: open its outputs, follow the run on the terminal, and report."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from dataclasses import dataclass, replace
+
+import mujoco
+
+from mjwrap import __version__
+from mjwrap.cli.common.output import Report, opened
+from mjwrap.cli.common.progress import progress_bar
+from mjwrap.cli.common.recorded import end, serve_until_stopped
+from mjwrap.cli.common.stopping import Interrupt, Stopped
+from mjwrap.cli.run.outputs import OutputSettings, open_outputs
+from mjwrap.files.atomic import uninterrupted
+from mjwrap.recording import Server, serve
+from mjwrap.runs.engine import MODES
+from mjwrap.runs.simulation import Log, RunSettings, Simulation, WallTime
+from mjwrap.text import counted
+
+
+@dataclass(frozen=True)
+class RunCommandSettings:
+    """The settings of `mjwrap run`.
+
+    model: a file, or "myo_sim:NAME". serve_port: where to serve the run to a browser, None: nowhere. json: the file
+    that the report goes to as values, "-" for standard output, or None.
+    """
+
+    model: str
+    run: RunSettings
+    outputs: OutputSettings
+    serve_port: int | None = None
+    json: str | None = None
+
+
+def run(settings: RunCommandSettings) -> int:
+    """Set up, run, and say what happened and where the files are."""
+    simulation = Simulation(settings.model, settings.run, option="--prescribe")
+    report = Report(settings.json)
+    with contextlib.ExitStack() as stack:
+        server = start_server(settings.serve_port, stack)
+        with contextlib.ExitStack() as outputs:
+            with uninterrupted():
+                wanted = settings.outputs
+                if server:
+                    wanted = replace(wanted, recording=replace(wanted.recording, connect=server.connect))
+                logs, closes = open_outputs(wanted, settings.model, simulation.engine, outputs)
+            simulation.begin()
+            with Interrupt() as interrupt:
+                spent = advance(simulation, logs, interrupt)
+                closing = time.perf_counter()
+                for close in closes:
+                    close()
+                outputs.close()
+        if logs:
+            spent = spent._replace(outputs=spent.outputs + time.perf_counter() - closing)
+        tell(report, settings, simulation, spent)
+        report.finish(facts(settings, simulation, spent, interrupt.asked))
+        if interrupt.asked:
+            name = interrupt.asked.name
+            print(f"mjwrap run: stopped by {name}; the files hold what was simulated", file=sys.stderr)
+            return interrupt.asked.code
+        if server:
+            told = "mjwrap run: done, and still served; Ctrl-C stops serving"
+            return serve_until_stopped(server, lambda: print(told, file=sys.stderr))
+        return 0
+
+
+def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None:
+    """Start what --serve asks for and say where it is, so that a browser can follow the run."""
+    if port is None:
+        return None
+    with uninterrupted():
+        server = opened(lambda: serve(port=port))
+        stack.callback(end, server)
+    print(f"mjwrap run: open {server.address}", file=sys.stderr)
+    return server
+
+
+def advance(simulation: Simulation, logs: list[Log], interrupt: Interrupt) -> WallTime:
+    """Run with a progress bar, until the end or a signal."""
+    bar = progress_bar(simulation.duration, "s", "simulating")
+    with contextlib.closing(bar):
+        return simulation.advance(logs, progress=bar.update, stopped=lambda: interrupt.asked)
+
+
+def tell(report: Report, settings: RunCommandSettings, simulation: Simulation, spent: WallTime) -> None:
+    """Say what was run, how fast, what went wrong, and where the files are."""
+    engine, muscles = simulation.engine, simulation.muscles
+    simulated = engine.data.time
+    mode = "" if settings.run.mode == MODES[0] else f", plugin mode {settings.run.mode}"
+    step = f"{_integrator(engine.model)}, time step {1e3 * engine.model.opt.timestep:g} ms"
+    report.say(f"{settings.model}: {counted(muscles.n, 'muscle')}, {step}{mode}")
+    wall = spent.simulation
+    rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
+    report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
+    if not muscles.n and not muscles.native:
+        report.say("the model declares no muscle that mjwrap could drive; only MuJoCo moved it")
+    if muscles.native:
+        report.say(f"{counted(len(muscles.native), 'actuator')} left to MuJoCo:")
+        for name, reason in muscles.native.items():
+            report.say(f"  {name}: {reason}")
+    failed = engine.failures()
+    if failed:
+        report.say("muscles without a path at some steps:")
+        for name, why in failed.items():
+            report.say(f"  {name}: {why}")
+    for what, path in settings.outputs.files.items():
+        report.say(f"{what + ':':10s} {path}")
+
+
+def facts(
+    settings: RunCommandSettings, simulation: Simulation, spent: WallTime, stopped: Stopped | None
+) -> dict[str, object]:
+    """Return the same as values."""
+    engine = simulation.engine
+    return {
+        "model": settings.model,
+        "mjwrap": __version__,
+        "mujoco": mujoco.__version__,
+        "mode": settings.run.mode,
+        "muscles": engine.muscles.names,
+        "native": engine.muscles.native,
+        "integrator": _integrator(engine.model),
+        "timestep": float(engine.model.opt.timestep),
+        "simulated": float(engine.data.time),
+        "wall": spent.simulation,
+        "wall_files": spent.outputs,
+        "stopped_by": stopped.name if stopped else None,
+        "paths_not_found": engine.failures(),
+        "files": settings.outputs.files,
+    }
+
+
+def _integrator(model: mujoco.MjModel) -> str:
+    return mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_").lower()

@@ -1,0 +1,161 @@
+"""Running a model: its settings, its start, and the loop over time steps."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from mjwrap.errors import ModelError
+from mjwrap.files import Table
+from mjwrap.paths import Status
+from mjwrap.runs.engine import MODES, start_engine
+from mjwrap.runs.excitation import Excitation
+from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
+from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
+from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
+
+Log = Callable[[mujoco.MjData], object]  # takes the state of a sample
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How a model is run.
+
+    duration and sample, the time between samples, rounded to whole time steps [s]. timestep [s] and integrator, a name
+    in `INTEGRATORS`: None leaves the model's. mode: what runs the muscles, one of `MODES`. excitation, seed: as
+    `Excitation` takes them. prescribed: joints that follow a motion, as `PrescribedMotion` takes them. keyframe: the
+    name of the start pose, None for qpos0. positions: of single hinges and slides at the start [rad, m]. strict: stop
+    where a muscle's path cannot be found.
+    """
+
+    duration: float = 1.0
+    sample: float = 0.005
+    timestep: float | None = None
+    integrator: str | None = None
+    mode: str = MODES[0]
+    excitation: Sequence[str] = ()
+    seed: int = 0
+    prescribed: Sequence[str] = ()
+    keyframe: str | None = None
+    positions: Mapping[str, float] = field(default_factory=dict)
+    strict: bool = False
+
+
+class WallTime(NamedTuple):
+    """Wall time [s]: of the simulation, and of sampling, drawing and writing it."""
+
+    simulation: float
+    outputs: float
+
+
+class Simulation:
+    """A model at the start of a run, with its excitation and its prescribed joints.
+
+    source: an MJCF or MJB file, or "myo_sim:NAME". option: what the prescribed joints were given by, for messages.
+    `ModelError` or `SignalError` for settings that do not fit the model.
+    """
+
+    def __init__(self, source: str, settings: RunSettings, *, option: str = "") -> None:
+        self.settings = settings
+        self.engine = engine = start_engine(source, settings.mode, settings.strict)
+        self.muscles = engine.muscles
+        for model in {id(m): m for m in (engine.model, engine.muscles.model)}.values():
+            if settings.timestep is not None:
+                model.opt.timestep = settings.timestep
+            if settings.integrator is not None:
+                model.opt.integrator = _integrator(settings.integrator)
+        key = start_keyframe(engine.model, settings.keyframe)
+        set_state(engine.model, engine.data, key, settings.positions)
+        self.excitation = Excitation(engine.muscles, settings.excitation, settings.seed)
+        self.prescribed = PrescribedMotion(engine.model, settings.prescribed, option=option)
+        check_free(engine.model, self.prescribed.joints, settings.positions)
+
+    @property
+    def duration(self) -> float:
+        """The set duration as whole time steps [s]."""
+        return self._steps * self._timestep
+
+    @property
+    def _timestep(self) -> float:
+        return float(self.engine.model.opt.timestep)
+
+    @property
+    def _steps(self) -> int:
+        return max(1, math.ceil(self.settings.duration / self._timestep - 1e-6))
+
+    def begin(self) -> None:
+        """Compute all at the start; compiles where that is still to do, before the clock starts.
+
+        `ModelError` for a muscle that would have to hold its last force and has none yet, as an end of it lies inside
+        a surface.
+        """
+        self.prescribed.place(self.engine.data)
+        self.excitation.write(self.engine.data)
+        self.engine.look()
+        muscles = self.muscles
+        inside = muscles.held & (muscles.status == Status.ENDPOINT_INSIDE)
+        for i in np.flatnonzero(inside)[:1].tolist():
+            raise ModelError(f"muscle '{muscles.names[i]}' has no path at the start: {muscles.reason(i)}")
+
+    def advance(
+        self,
+        logs: Sequence[Log] = (),
+        *,
+        progress: Callable[[float], object] = lambda seconds: None,
+        stopped: Callable[[], object] = lambda: False,
+    ) -> WallTime:
+        """Run for the set duration, or until `stopped` returns something true; return the time that it took.
+
+        logs: called with the state of every sample, the muscles evaluated at it; also at the end, unless stopped.
+        progress: called at every sample with the simulated time since the last one [s].
+        """
+        data, timestep, steps = self.engine.data, self._timestep, self._steps
+        stride = max(1, round(self.settings.sample / timestep))
+        started, outputs = time.perf_counter(), 0.0
+        for k in range(steps):
+            if k % stride == 0:
+                outputs += self._sample(logs)
+                progress(0.0 if k == 0 else stride * timestep)
+            if stopped():
+                break
+            self.prescribed.drive(data)
+            self.engine.step()
+            self.prescribed.place(data)
+            self.excitation.write(data)
+        else:
+            outputs += self._sample(logs)
+        return WallTime(time.perf_counter() - started - outputs, outputs)
+
+    def _sample(self, logs: Sequence[Log]) -> float:
+        """Log the present state; return the time [s] that it took."""
+        started = time.perf_counter()
+        if logs:
+            self.engine.look()
+            for log in logs:
+                log(self.engine.seen)
+        return time.perf_counter() - started
+
+
+def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = DEFAULT_KINDS) -> Table:
+    """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
+
+    source: an MJCF or MJB file, or "myo_sim:NAME". kinds: which numbers the table holds, of `run_table.KINDS`; columns
+    are called KIND:NAME, in SI units. Errors as `Simulation` and its `advance` raise them.
+    """
+    simulation = Simulation(source, settings or RunSettings())
+    table = RunTable(simulation.muscles.model, simulation.muscles, kinds)
+    simulation.begin()
+    simulation.advance([table.log])
+    return table.table()
+
+
+def _integrator(name: str) -> mujoco.mjtIntegrator:
+    if name not in INTEGRATORS:
+        raise ModelError(f"integrator '{name}' does not exist; integrators: {', '.join(INTEGRATORS)}")
+    return INTEGRATORS[name]
