@@ -95,15 +95,6 @@ def kernel_rows(node: Node) -> list[Array]:
     return [row, twin]
 
 
-def last_dofs(model: mujoco.MjModel) -> Ints:
-    """Return the last degree of freedom that moves each body (nbody,), -1 for those that stand still."""
-    last = np.full(model.nbody, -1, dtype=np.int64)
-    for body in range(1, model.nbody):
-        first, count = int(model.body_dofadr[body]), int(model.body_dofnum[body])
-        last[body] = first + count - 1 if count else last[model.body_parentid[body]]
-    return last
-
-
 def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
     """Return the kernels' arrays for a list of muscles."""
     links: list[tuple[int, int, int, int]] = []

@@ -11,22 +11,14 @@ from numpy.typing import NDArray
 from mjwrap.errors import ModelError
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.mjcf import MuscleDeclaration, name_of
-from mjwrap.model.arrays import Plan, last_dofs
+from mjwrap.model.arrays import Plan
+from mjwrap.model.kinematic_tree import last_dofs, moving_dofs
 from mjwrap.plugin.callbacks import transmission as tr
 from mjwrap.plugin.mujoco_c.offsets import offsets
 from mjwrap.plugin.spec.placeholders import is_measured_late, shown_tendons
 
 Ints = NDArray[np.int64]
 OBJ = mujoco.mjtObj
-
-
-def _moved_by(model: mujoco.MjModel, last: Ints, body: int) -> set[int]:
-    """Return the dofs that move a body."""
-    dofs, dof = set(), int(last[body])
-    while dof >= 0:
-        dofs.add(dof)
-        dof = int(model.dof_parentid[dof])
-    return dofs
 
 
 def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
@@ -38,14 +30,14 @@ def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
 
 def check_room(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> None:
     """Raise `ModelError` for a muscle whose path changes with a dof for which its actuator's moment has no room."""
-    last = last_dofs(model)
+    moves = moving_dofs(model)
     for route in plan.routes:
         muscle = muscles[int(route[muscle_paths.R_MUSCLE])]
         if plan.output[route[muscle_paths.R_MUSCLE]] < 0:
             continue
         stops = plan.links[route[muscle_paths.R_LO] : route[muscle_paths.R_HI], muscle_paths.L_BODY].tolist()
         bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
-        moved = {body: _moved_by(model, last, body) for body in bodies}
+        moved = {body: set(np.flatnonzero(moves[body]).tolist()) for body in bodies}
         room = _columns(model, muscle.actuator) | set.intersection(*moved.values())
         for body, dofs in moved.items():
             if not dofs <= room:
