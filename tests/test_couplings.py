@@ -62,7 +62,7 @@ def test_followers_stand_where_mujoco_itself_wants_them(model: mujoco.MjModel) -
     couplings, rng = CoupledJoints(model), np.random.default_rng(0)
     data = mujoco.MjData(model)
     contradiction = 6  # the second equality of `second`
-    wanted = [i for i in np.flatnonzero(model.eq_active0) if i != contradiction]
+    wanted = [int(i) for i in np.flatnonzero(model.eq_active0) if i != contradiction]
     for _ in range(50):
         qpos = random_pose(model, rng)
         couplings.place(qpos)

@@ -30,9 +30,9 @@ from mjwrap.cli.common.models import load_spec
 from mjwrap.comparison import Jump, compare_poses
 from mjwrap.comparison.motion import unstable
 from mjwrap.mjcf import name_of, read_declarations
+from mjwrap.model.couplings import read_couplings
 from mjwrap.paths import Status
 from mjwrap.plugin import read
-from mjwrap.model.couplings import read_couplings
 
 MODELS = [f"myo_sim:{name}" for name in ("myolegs", "myoarm_r", "myohand_r", "myotorso", "myofullbody")]
 HOLD = 0.1  # [s] that a control is held

@@ -1,4 +1,4 @@
-"""The flat arrays that the kernels read for all muscles of a model, built once from its declarations."""
+"""Builds the flat arrays that the kernels read, once for all muscles of a model, from its declarations."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.musculotendon import dynamics, tension
-from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
+from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
 from mjwrap.muscles.laws import ActuatorForce
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
 
 
 def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int) -> tuple[int, list[float]]:
-    """Return form and constants of a muscle's activation dynamics: mjwrap's, or the actuator's that acts early."""
+    """Return form and constants of a muscle's activation dynamics: mjwrap's, or those of an actuator with actearly."""
     if source != dynamics.EARLY:
         return declared.activation.form, [*declared.activation.row(), 0.0, 0.0]
     actuator = declared.actuator
@@ -75,7 +75,7 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
     if model.actuator_actlimited[actuator]:
         low, high = (float(x) for x in model.actuator_actrange[actuator])
     constants = [float(x) for x in model.actuator_dynprm[actuator, :3]]
-    return EARLY_DYNAMICS[int(model.actuator_dyntype[actuator])], [*constants, low, high]
+    return ACTEARLY_DYNAMICS[int(model.actuator_dyntype[actuator])], [*constants, low, high]
 
 
 def kernel_rows(node: Node) -> list[Array]:

@@ -1,4 +1,4 @@
-"""Joints that follow other joints by joint equalities: where they belong, and how they move with their leaders.
+"""Puts joints that follow others by joint equalities where they belong, and gives their Jacobian N.
 
 A joint equality of MuJoCo (`<equality><joint polycoef>`) wants its first joint, the follower, at q = qpos0 + Σ cᵢ xⁱ,
 i = 0..4, where x is q − qpos0 of its second joint, the leader, and 0 where there is no leader. In a simulation it is a

@@ -1,4 +1,4 @@
-"""Which degrees of freedom move which bodies, and which of them a muscle crosses."""
+"""Finds which degrees of freedom move which bodies, and which of them a muscle crosses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be asked of a MuscleSystem after an evaluation: numbers per muscle, and its paths in space."""
+"""Gives the results of an evaluation: numbers of each muscle, and its path in space."""
 
 from __future__ import annotations
 

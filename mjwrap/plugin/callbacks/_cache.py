@@ -1,6 +1,7 @@
-"""How the callbacks are compiled and where their machine code is kept: as the kernels', beside them.
+"""Compiles the callbacks, and keeps their machine code beside that of the kernels.
 
-The folder is named by a hash over the sources in this package: numba does not notice an edit in a callee's file.
+The folder is named by a hash over the sources in this package and the marks that they read: numba does not notice an
+edit in the file of a function or constant that a compiled function uses.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any, TypeVar
 import numba
 
 from mjwrap.kernels._jit import cache_dir, config
+from mjwrap.mjcf import marks
 
 F = TypeVar("F", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "cache": True}
@@ -20,7 +22,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "c
 
 def _folder() -> str:
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    for file in [*sorted(Path(__file__).parent.glob("*.py")), Path(marks.__file__)]:
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return str(cache_dir() / f"plugin-{digest.hexdigest()[:16]}")
 
