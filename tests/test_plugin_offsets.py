@@ -98,6 +98,6 @@ def test_a_missing_field_and_an_unknown_type_are_named(monkeypatch: pytest.Monke
     monkeypatch.setattr(off, "structs", lambda: declared)
     with pytest.raises(VersionError, match="have no subtree_com"):
         off.offsets.__wrapped__()
-    monkeypatch.delitem(off._SIZES, "mjtNum")
+    monkeypatch.delitem(off._TYPES, "mjtNum")
     with pytest.raises(VersionError, match="type mjtNum"):
         off.offsets.__wrapped__()

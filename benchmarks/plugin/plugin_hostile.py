@@ -36,9 +36,9 @@ import numpy as np
 from plugin_scenes import SAYS, SCENES, SHORT
 
 import mjwrap as mw
-from mjwrap.plugin import register as reg
-from mjwrap.plugin.blocks import image
+from mjwrap.plugin.blocks import allocation, image
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.mujoco_c.registration import address_of, keep_forever
 
 ROOT = Path(__file__).resolve().parents[2]
 RED, ZONE = 0x7FF8DEADBEEFF00D, 16  # a NaN, and how many words of it stand between two arrays
@@ -91,9 +91,9 @@ def put_up_fences() -> None:
 
     kept_rooms: list[mmap.mmap] = []
     free = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(give_back)
-    reg._for_ever(free)
-    reg.block_image, reg._raw_malloc = fenced, allocate  # type: ignore[assignment]
-    reg._free = lambda: reg._address(free)
+    keep_forever(free)
+    allocation.block_image, allocation.raw_malloc = fenced, allocate  # type: ignore[assignment]
+    allocation.free_function = lambda: address_of(free)
 
 
 def child(scene: str, fences: bool) -> int:

@@ -28,9 +28,9 @@ import mjwrap as mw
 from mjwrap.comparison import Jump, compare_poses
 from mjwrap.comparison.motion import unstable
 from mjwrap.mjcf import name_of, read_declarations
+from mjwrap.model.couplings import read_couplings
 from mjwrap.paths import Status
 from mjwrap.plugin import read
-from mjwrap.poses.joint_sweeps import read_couplings
 from mjwrap.runs.models import load_spec
 
 MODELS = [f"myo_sim:{name}" for name in ("myolegs", "myoarm_r", "myohand_r", "myotorso", "myofullbody")]

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf import MuscleDeclaration, name_of, names
-from mjwrap.poses.joint_sweeps import Coupling, read_couplings
+from mjwrap.model.couplings import CoupledJoints
+from mjwrap.model.kinematic_tree import crossed_dofs
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -36,7 +37,8 @@ class JointSpace:
             raise StateError(
                 f"the base pose must be finite and have shape ({model.nq},), not {self.base.shape}"
             )
-        self._levels, leader = _ordered(read_couplings(model), model)
+        self._couplings = CoupledJoints(model)
+        leader = self._couplings.leader
         spans = _spans(model, ranges, leader)
         free = [j for j in range(model.njnt) if j not in leader]
         self.held = [j for j in free if j not in spans]
@@ -56,7 +58,6 @@ class JointSpace:
         for b, joint in enumerate(self.balls):
             owner[joint] = [*range(self._ball(b).start, self._ball(b).stop)]
         self._owner = owner
-        self._leader = leader
 
     def _ball(self, b: int) -> slice:
         first = len(self.single) + 3 * b
@@ -104,8 +105,7 @@ class JointSpace:
             quat = np.array([1.0, 0.0, 0.0, 0.0])
             mujoco.mju_quatIntegrate(quat, u[self._ball(b)] * self._reach[b], 1.0)
             qpos[adr : adr + 4] = quat
-        for level in self._levels:
-            qpos[level.qpos_at] = level.rest + level.value(qpos)
+        self._couplings.place(qpos)
         return qpos
 
     def tangent(self, u: Array, qpos: Array) -> Array:
@@ -115,77 +115,23 @@ class JointSpace:
         for b, joint in enumerate(self.balls):
             dof, part = int(self.model.jnt_dofadr[joint]), self._ball(b)
             found[dof : dof + 3, part] = _right_jacobian(u[part] * self._reach[b]) * self._reach[b]
-        for level in self._levels:
-            found[level.dof_at] = level.slope(qpos)[:, None] * found[level.leader_dof]
+        self._couplings.spread(qpos, found)
         return found
 
     def moves(self, muscles: list[MuscleDeclaration]) -> tuple[Bools, list[tuple[str, ...]]]:
         """Return which variables move which muscle (n, k), and the names of the held joints that do."""
-        joints = _joints_between(self.model, muscles)
+        joints = crossed_dofs(self.model, muscles)[
+            :, self.model.jnt_dofadr
+        ]  # all dofs of a joint move the same bodies
         variables = np.zeros((len(muscles), self.k), dtype=np.bool_)
         held: list[tuple[str, ...]] = []
         for i, row in enumerate(joints):
-            led = [self._led_by(int(j)) for j in np.flatnonzero(row)]
+            led = [self._couplings.head(int(j)) for j in np.flatnonzero(row)]
             for joint in led:
                 variables[i, self._owner.get(joint, [])] = True
             still = [j for j in self.held if j in led]
             held.append(tuple(name_of(self.model, mujoco.mjtObj.mjOBJ_JOINT, j) for j in still))
         return variables, held
-
-    def _led_by(self, joint: int) -> int:
-        """Return the joint at the head of a row of couplings, -1 where it is fixed."""
-        while joint in self._leader:
-            joint = self._leader[joint]
-        return joint
-
-
-class _Level:
-    """Couplings whose leaders are placed before them, as arrays."""
-
-    def __init__(self, model: mujoco.MjModel, couplings: list[Coupling]) -> None:
-        joints = [c.joint for c in couplings]
-        leaders = [max(c.leader, 0) for c in couplings]
-        self.qpos_at, self.dof_at = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
-        self.rest = model.qpos0[self.qpos_at]
-        self.leader_dof = model.jnt_dofadr[leaders]
-        self._leader_at = model.jnt_qposadr[leaders]
-        self._leader_rest = model.qpos0[self._leader_at]
-        self._led = np.array([float(c.leader >= 0) for c in couplings])
-        self._c = np.array([c.coefficients for c in couplings]).T  # (5, couplings)
-
-    def _x(self, qpos: Array) -> Array:
-        return (qpos[self._leader_at] - self._leader_rest) * self._led
-
-    def value(self, qpos: Array) -> Array:
-        x, c = self._x(qpos), self._c
-        return c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * c[4])))
-
-    def slope(self, qpos: Array) -> Array:
-        x, c = self._x(qpos), self._c
-        return self._led * (c[1] + x * (2.0 * c[2] + x * (3.0 * c[3] + x * 4.0 * c[4])))
-
-
-def _ordered(couplings: list[Coupling], model: mujoco.MjModel) -> tuple[list[_Level], dict[int, int]]:
-    """Return the couplings in levels, leaders first, and each follower's leader.
-
-    A joint follows its first coupling only, and one that would close a ring of couplings follows none.
-    """
-    chosen: dict[int, Coupling] = {}
-    for coupling in couplings:
-        head = coupling.leader
-        while head in chosen:
-            head = chosen[head].leader
-        if coupling.joint not in chosen and head != coupling.joint:
-            chosen[coupling.joint] = coupling
-
-    def depth(joint: int) -> int:
-        return 1 + depth(chosen[joint].leader) if joint in chosen else 0
-
-    by_depth: dict[int, list[Coupling]] = {}
-    for joint, coupling in chosen.items():
-        by_depth.setdefault(depth(joint), []).append(coupling)
-    levels = [_Level(model, by_depth[d]) for d in sorted(by_depth)]
-    return levels, {joint: coupling.leader for joint, coupling in chosen.items()}
 
 
 def _spans(
@@ -217,23 +163,6 @@ def _spans(
             wanted = "0 and a largest angle up to π" if ball else "finite and not decreasing"
             raise ModelError(f"range of joint '{known[joint]}' must be {wanted}, not {low:g} to {high:g}")
     return spans
-
-
-def _joints_between(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Bools:
-    """Return which joints (n, njnt) move a muscle: they have some, not all, of a route's stops above them."""
-    above = np.zeros((model.nbody, model.njnt), dtype=np.bool_)
-    for body in range(1, model.nbody):
-        above[body] = above[model.body_parentid[body]]
-        first = int(model.body_jntadr[body])
-        above[body, first : first + int(model.body_jntnum[body])] = True
-    found = np.zeros((len(muscles), model.njnt), dtype=np.bool_)
-    for i, muscle in enumerate(muscles):
-        for route in muscle.routes:
-            sites = [route.origin, route.insertion, *(n.site for n in route.nodes if n.geom < 0)]
-            geoms = [n.geom for n in route.nodes if n.geom >= 0]
-            stops = above[[*model.site_bodyid[sites], *model.geom_bodyid[geoms]]]
-            found[i] |= stops.any(axis=0) & ~stops.all(axis=0)
-    return found
 
 
 def _right_jacobian(turn: Array) -> Array:

@@ -10,7 +10,7 @@ from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
 from mjwrap.comparison.verdict import slope
 from mjwrap.poses.continuity import NARROW, odd_intervals, refine_jump
-from mjwrap.poses.joint_sweeps import Motion, PoseMaker
+from mjwrap.poses.joint_sweeps import PoseMaker, PoseSequence
 from mjwrap.poses.walking import Found, Place
 from mjwrap.text import counted
 
@@ -69,7 +69,7 @@ def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
     return replace(jump, other_smooth=has_path and not jumps_too)
 
 
-def _native_jumps(comparer: Comparer, twin: Twin, place: Place, motion: Motion) -> list[Found]:
+def _native_jumps(comparer: Comparer, twin: Twin, place: Place, motion: PoseSequence) -> list[Found]:
     """Return the jumps of MuJoCo's tendon, whose path depends on the pose alone."""
 
     def probe(at: float) -> tuple[float, float]:
@@ -103,7 +103,7 @@ def _sides(
     """Say what the path was on either side of a jump."""
     ends = [place(at - 2.0 * NARROW * span), place(at + 2.0 * NARROW * span)]
     qpos, tangent = (np.array(part) for part in zip(*ends, strict=True))
-    motion = Motion("", np.arange(2.0), qpos, tangent, np.zeros_like(tangent), False)
+    motion = PoseSequence("", np.arange(2.0), qpos, tangent, np.zeros_like(tangent), False)
     for again in comparer.evaluate(motion).twins:
         if again.name == twin.name:
             record = again.native if program == "MuJoCo" else again.mjwrap

@@ -64,7 +64,7 @@ def unstable(data: mujoco.MjData) -> bool:
 
 def pristine(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return a copy in which every native actuator pulls, though a `MuscleSystem` may hold the original's still."""
-    with Takeover(model).suspended():
+    with Takeover(model).original_limits():
         return copy.copy(model)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mjwrap.comparison.judge_geodesic import ANGLE, HELD, Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
-from mjwrap.poses.joint_sweeps import Motion
+from mjwrap.poses.joint_sweeps import PoseSequence
 from mjwrap.poses.walking import Walk, Walker
 from mjwrap.system import MuscleSystem
 
@@ -71,7 +71,7 @@ class Twin:
 class Batch:
     """All compared muscles over one motion; walk: all of mjwrap's."""
 
-    motion: Motion
+    motion: PoseSequence
     walk: Walk
     twins: list[Twin] = field(default_factory=list)
 
@@ -122,7 +122,7 @@ class Comparer:
         spans = tendon_spans(model, self._native_data, tendon)
         return _Pair(name, -1, tendon, spans) if spans else "it has no spatial tendon"
 
-    def evaluate(self, motion: Motion, start: Array | None = None) -> Batch:
+    def evaluate(self, motion: PoseSequence, start: Array | None = None) -> Batch:
         """Evaluate all poses of a motion; start (nq,): where a continuous one comes from, with its branch."""
         count, nv = len(motion.at), self.model.nv
         native, mine = _Numbers(count, self.model.ntendon, nv), _Numbers(count, self.muscles.n, nv)

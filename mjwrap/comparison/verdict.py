@@ -14,7 +14,7 @@ from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.twins import PathRecord, Twin
 from mjwrap.mjcf import name_of
 from mjwrap.paths import Status
-from mjwrap.poses.joint_sweeps import Motion
+from mjwrap.poses.joint_sweeps import PoseSequence
 
 Array = NDArray[np.float64]
 AGREE = 1e-9  # [m, m/s, m/rad] two true geodesics on one branch agree to this
@@ -121,7 +121,7 @@ class MuscleSummary:
     curves: Curves | None = None
     bad_poses: list[tuple[str, str, float, dict[str, float]]] = field(default_factory=list)
 
-    def add(self, model: mujoco.MjModel, motion: Motion, twin: Twin) -> None:
+    def add(self, model: mujoco.MjModel, motion: PoseSequence, twin: Twin) -> None:
         """Take in one motion."""
         native, mine = twin.native, twin.mjwrap
         self.poses += len(motion.at)
@@ -161,7 +161,7 @@ class MuscleSummary:
         self._keep_extremes(model, motion, twin, gaps)
         self._keep_curves(motion, twin, float(gaps[0].max(initial=0.0)))
 
-    def _keep_extremes(self, model: mujoco.MjModel, motion: Motion, twin: Twin, gaps: Array) -> None:
+    def _keep_extremes(self, model: mujoco.MjModel, motion: PoseSequence, twin: Twin, gaps: Array) -> None:
         native, mine = twin.native, twin.mjwrap
         assert mine is not None
         for row, name in enumerate(("length", "velocity", "moment_arm")):
@@ -178,7 +178,7 @@ class MuscleSummary:
             where = motion.name, float(motion.at[k]), _joints(model, motion.qpos[k])
             setattr(self, name, Extreme(float(gaps[row, k]), *where, float(theirs), float(ours), dof))
 
-    def _keep_curves(self, motion: Motion, twin: Twin, gap: float) -> None:
+    def _keep_curves(self, motion: PoseSequence, twin: Twin, gap: float) -> None:
         """Keep the sweep that shows most: the largest difference, else the largest change of length."""
         if not motion.continuous:
             return
@@ -202,7 +202,7 @@ class MuscleSummary:
         return sum(self.counts[outcome.name] for outcome in MJWRAP_AT_FAULT)
 
 
-def slope(record: PathRecord, motion: Motion) -> Array:
+def slope(record: PathRecord, motion: PoseSequence) -> Array:
     """Return dl/d(at) (T,) along a sweep [m/rad or 1]."""
     return np.einsum("tj,tj->t", record.jacobian, motion.tangent)
 

@@ -1,10 +1,10 @@
-"""Declarations of muscles in an MjModel: what pulls, along which sites and geoms, by which law.
+"""Reads the muscles that an MjModel declares: what pulls, along which sites and geoms, by which law.
 
 Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendon, as it stands; and `<custom>` tuples
 whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing here changes the model.
 """
 
-from mjwrap.mjcf.actuators import EARLY_DYNAMICS, keeps_state
+from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.loading import read_model
 from mjwrap.mjcf.names import act_names, dof_names, has_plugin, name_of, names, qpos_names
@@ -13,7 +13,7 @@ from mjwrap.mjcf.routes import tendon_stops
 from mjwrap.mjcf.writing import set_laws
 
 __all__ = [
-    "EARLY_DYNAMICS",
+    "ACTEARLY_DYNAMICS",
     "Declarations",
     "MuscleDeclaration",
     "Node",

@@ -1,4 +1,4 @@
-"""Native actuators: which ones mjwrap can take over, and the muscle curves that they carry.
+"""Tells which native actuators mjwrap can take over, and reads the muscle curves that they carry.
 
 Most fields of an actuator are indexed by its id. Some actuators have several controls and outputs, so what belongs to
 these (control limits; gear, length range, acc0) is indexed by `actuator_ctrladr` and `actuator_outadr`.
@@ -26,7 +26,8 @@ _BIASES = [
 
 _NO_BIAS, _MUSCLE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
 _DYN = mujoco.mjtDyn
-EARLY_DYNAMICS = {  # dyntypes whose next activation the kernels know
+# dyntypes whose next activation the kernels can compute, for actuators with `actearly`, which act with that one
+ACTEARLY_DYNAMICS = {
     int(_DYN.mjDYN_INTEGRATOR): early_activation.INTEGRATOR,
     int(_DYN.mjDYN_FILTER): early_activation.FILTER,
     int(_DYN.mjDYN_FILTEREXACT): early_activation.FILTER_EXACT,
@@ -67,7 +68,7 @@ def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
         return "it belongs to a plugin"
     keeps = keeps_state(model, actuator)
     if model.actuator_actearly[actuator] and int(model.actuator_actnum[actuator]) > 0:
-        if int(model.actuator_dyntype[actuator]) not in EARLY_DYNAMICS:
+        if int(model.actuator_dyntype[actuator]) not in ACTEARLY_DYNAMICS:
             return "its activation acts early (actearly) and has other dynamics than integrator, filter or muscle"
         if float(model.actuator_delay[actuator]) > 0.0:
             return "its activation acts early (actearly) and its control with a delay"

@@ -1,4 +1,4 @@
-"""What a model declares, as plain data: the ids are MuJoCo's, the parameters a law's."""
+"""Dataclasses for what a model declares: muscles, their routes and the stops on these; ids are MuJoCo's."""
 
 from __future__ import annotations
 

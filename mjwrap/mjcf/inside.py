@@ -1,4 +1,4 @@
-"""Sites inside the geom of a spatial tendon: by a side site there MuJoCo is told to hold the string to the solid."""
+"""Tells which sites lie inside a geom that a tendon wraps: a side site there makes MuJoCo hold the path inside."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loading a model from a file, with errors that say what is wrong and what is there."""
+"""Loads a model from a file; errors say what is wrong and which models are there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of a model's objects, for messages that say what is there."""
+"""Names a model's objects, for messages and for columns of tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import mujoco
 
-PLUGIN_INSTANCE = "mjwrap"  # of the engine plugin, behind the prefix of the model that it was attached with
+from mjwrap.mjcf.marks import own_instances
 
 
 def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
@@ -26,8 +26,7 @@ def listed(found: Iterable[str]) -> str:
 
 def has_plugin(model: mujoco.MjModel) -> bool:
     """Return whether mjwrap's engine plugin drives the muscles of a model."""
-    kind = mujoco.mjtObj.mjOBJ_PLUGIN
-    return any(name_of(model, kind, i).endswith(PLUGIN_INSTANCE) for i in range(model.nplugin))
+    return bool(own_instances(model))
 
 
 def qpos_names(model: mujoco.MjModel) -> list[str]:

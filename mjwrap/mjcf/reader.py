@@ -1,4 +1,4 @@
-"""All declarations of a model: those that its tuples make, and its native muscle actuators."""
+"""Reads all muscles of a model: those that its tuples declare, and its native muscle actuators."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Routes of muscles: a list of stops, from a tendon or a tuple, becomes stretches of string between sites."""
+"""Builds the routes of muscles: a list of stops, from a tendon or a tuple, becomes pieces of string between sites."""
 
 from __future__ import annotations
 

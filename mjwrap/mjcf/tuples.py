@@ -1,4 +1,4 @@
-"""A `<custom>` tuple whose name contains "mjwrap" is one muscle: its route, parameters, law and actuator."""
+"""Reads a muscle from a `<custom>` tuple whose name contains "mjwrap": route, parameters, law and actuator."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a compiled model gives to mjwrap: the kernels' flat arrays, and which native actuators are taken over."""
+"""What mjwrap makes of a compiled model: the kernels' arrays, disabled actuators, coupled joints, crossed dofs."""

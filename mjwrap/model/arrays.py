@@ -1,4 +1,4 @@
-"""The flat arrays that the kernels read for all muscles of a model, built once from its declarations."""
+"""Builds the flat arrays that the kernels read, once for all muscles of a model, from its declarations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.coupling.groups import Routes
 from mjwrap.kernels.musculotendon import dynamics, tension
 from mjwrap.kernels.musculotendon.groups import Muscles
-from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
+from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
 from mjwrap.muscles.laws import ActuatorForce
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
 
 
 def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int) -> tuple[int, list[float]]:
-    """Return form and constants of a muscle's activation dynamics: mjwrap's, or the actuator's that acts early."""
+    """Return form and constants of a muscle's activation dynamics: mjwrap's, or those of an actuator with actearly."""
     if source != dynamics.EARLY:
         return declared.activation.form, [*declared.activation.row(), 0.0, 0.0]
     actuator = declared.actuator
@@ -88,7 +88,7 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
     if model.actuator_actlimited[actuator]:
         low, high = (float(x) for x in model.actuator_actrange[actuator])
     constants = [float(x) for x in model.actuator_dynprm[actuator, :3]]
-    return EARLY_DYNAMICS[int(model.actuator_dyntype[actuator])], [*constants, low, high]
+    return ACTEARLY_DYNAMICS[int(model.actuator_dyntype[actuator])], [*constants, low, high]
 
 
 def kernel_rows(node: Node) -> list[Array]:
@@ -106,15 +106,6 @@ def kernel_rows(node: Node) -> list[Array]:
     twin = row.copy()
     twin[layout.TWIN] = 1.0
     return [row, twin]
-
-
-def last_dofs(model: mujoco.MjModel) -> Ints:
-    """Return the last degree of freedom that moves each body (nbody,), -1 for those that stand still."""
-    last = np.full(model.nbody, -1, dtype=np.int64)
-    for body in range(1, model.nbody):
-        first, count = int(model.body_dofadr[body]), int(model.body_dofnum[body])
-        last[body] = first + count - 1 if count else last[model.body_parentid[body]]
-    return last
 
 
 def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:

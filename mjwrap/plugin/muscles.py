@@ -1,4 +1,4 @@
-"""`Muscles`: what the engine plugin last computed for a mjData, with the face of a MuscleSystem."""
+"""`Muscles`: shows what the engine plugin last computed for an mjData as a MuscleSystem shows its results."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import Declarations
-from mjwrap.plugin import register as reg
+from mjwrap.plugin.blocks.reading import read_instances
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.readout import block_address, head_of, instances, transmit
+from mjwrap.plugin.spec.configuration import TRANSMISSION, configuration_at
 from mjwrap.system.results import Results
 from mjwrap.system.state import NUMBERS, Evaluation
 
@@ -36,12 +37,12 @@ class Muscles(Results):
             raise StateError(f"expected an MjData, not {type(data).__name__}")
         self.data = data
         self._instances = instances(data.model)
-        plan, muscles = reg.read_instances(data.model._address, self._instances)
+        plan, muscles = read_instances(data.model._address, self._instances)
         super().__init__(
             Declarations(muscles), plan, data.model, Evaluation(plan.n, plan.node, len(plan.routes))
         )
         self._transmits = any(
-            reg.claim_of(data.model._address, i).mode == reg.TRANSMISSION for i in self._instances
+            configuration_at(data.model._address, i).mode == TRANSMISSION for i in self._instances
         )
         self._blocks: list[int] = []
         self._views: list[Evaluation] = []

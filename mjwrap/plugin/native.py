@@ -1,4 +1,4 @@
-"""Which muscles of an installed model the plugin has left to MuJoCo."""
+"""Names the muscles of an installed model that the plugin has left to MuJoCo, with the reasons."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import copy
 
 import mujoco
 
-from mjwrap.mjcf import read_declarations
+from mjwrap.mjcf import marks, read_declarations
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.readout import instances
-from mjwrap.plugin.register import TRANSMISSION, claim_of, hush_to_silence
-from mjwrap.plugin.spec.placeholders import restore_placeholders
+from mjwrap.plugin.spec.configuration import TRANSMISSION, configuration_at
+from mjwrap.plugin.spec.tendons import restore_tendons
 
 
 def native(model: mujoco.MjModel) -> dict[str, str]:
@@ -18,13 +18,13 @@ def native(model: mujoco.MjModel) -> dict[str, str]:
 
     Muscles, and in transmission mode all actuators on spatial tendons. `StateError` where there is no plugin.
     """
-    claims = [claim_of(model._address, instance) for instance in instances(model)]
+    configurations = [configuration_at(model._address, instance) for instance in instances(model)]
     twin = copy.copy(model)
-    hush_to_silence(twin)
-    restore_placeholders(twin)
+    marks.zero_disabled_ranges(twin)
+    restore_tendons(twin)
     found: dict[str, str] = {}
-    with Takeover(twin).suspended():
-        for mode in sorted({claim.mode for claim in claims}):
+    with Takeover(twin).original_limits():
+        for mode in sorted({each.mode for each in configurations}):
             found |= read_declarations(twin, transmission=mode == TRANSMISSION).native
-    taken = {name for claim in claims for name in claim.muscles}
+    taken = {name for each in configurations for name in each.muscles}
     return {name: reason for name, reason in found.items() if name not in taken}

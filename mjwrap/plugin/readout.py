@@ -1,4 +1,4 @@
-"""What the plugin last computed for a mjData, and the excitations of muscles without an actuator."""
+"""Reads what the plugin last computed for an mjData, and sets the excitations of muscles without an actuator."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
-from mjwrap.plugin import register as reg
+from mjwrap.mjcf.marks import own_instances
+from mjwrap.plugin.blocks.table import find_block
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import transmission as tr
 from mjwrap.plugin.callbacks.saving import PER_MUSCLE
+from mjwrap.plugin.spec.configuration import configuration_at
 
 Array = NDArray[np.float64]
 _COLUMNS = ("length", "velocity", "tension", "activation", "fiber", "status", "failures")  # of the block
@@ -37,8 +39,7 @@ class Readout:
 
 def instances(model: mujoco.MjModel) -> list[int]:
     """Return the ids of mjwrap's instances in a model; `StateError` where there is none."""
-    named = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin)]
-    found = [i for i, name in enumerate(named) if name.endswith(reg.INSTANCE)]
+    found = own_instances(model)
     if not found:
         raise StateError("this model has no muscles in the engine plugin; install or load puts them there")
     return found
@@ -46,7 +47,7 @@ def instances(model: mujoco.MjModel) -> list[int]:
 
 def block_address(data: mujoco.MjData, instance: int) -> int:
     """Return the address of an instance's block."""
-    address = reg.block_address(data._address, instance)
+    address = find_block(data._address, instance)
     if address == 0:
         raise StateError("this mjData has no muscles of the engine plugin: it was made without them")
     return address
@@ -62,7 +63,7 @@ def read(data: mujoco.MjData) -> Readout:
     names: list[str] = []
     columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
     for instance in instances(data.model):
-        names += reg.claim_of(data.model._address, instance).muscles
+        names += configuration_at(data.model._address, instance).muscles
         block = block_address(data, instance)
         head = head_of(block)
         for name in _COLUMNS:
@@ -101,6 +102,6 @@ def excitations(data: mujoco.MjData) -> dict[str, Array]:
     model, found = data.model, {}
     for instance in instances(model):
         first = int(model.plugin_stateadr[instance]) + 3  # the clock, then activation and fibre length
-        for m, name in enumerate(reg.claim_of(model._address, instance).muscles):
+        for m, name in enumerate(configuration_at(model._address, instance).muscles):
             found[name] = data.plugin_state[first + PER_MUSCLE * m :][:1]
     return found

@@ -1,1 +1,1 @@
-"""Poses of a model: sweeps of joints over their ranges, random ones, and jumps along them."""
+"""Makes poses of a model, takes muscles from pose to pose, and finds jumps of their lengths on the way."""

@@ -1,4 +1,4 @@
-"""Jumps of a length or its slope along a sweep: told from a steep stretch by halving the step until a jump is left."""
+"""Finds jumps of a length or its slope along a sweep: halving an interval tells a jump from a steep stretch."""
 
 from __future__ import annotations
 

@@ -1,16 +1,16 @@
-"""Poses of a model: sweeps of every joint over its range, and random ones; joints that are coupled follow."""
+"""Makes poses of a model: sweeps of each joint over its range, and random poses, with coupled joints in place."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.mjcf import name_of
+from mjwrap.model.couplings import CoupledJoints
 
 Array = NDArray[np.float64]
 _KINDS = mujoco.mjtJoint
@@ -18,13 +18,13 @@ _HINGE, _SLIDE, _BALL = int(_KINDS.mjJNT_HINGE), int(_KINDS.mjJNT_SLIDE), int(_K
 
 
 @dataclass(frozen=True)
-class Motion:
+class PoseSequence:
     """Poses to evaluate in order.
 
     name: a joint's, or "random poses"; at (T,): the joint's position [m or rad], or a running number; qpos (T, nq);
     tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether one pose leads to the next;
-    base: the number of the pose around which a joint is swept; alone: whether that joint is coupled to another one,
-    so that no motion leads there.
+    base: the number of the pose around which a joint is swept; alone: whether that joint follows another one, so
+    that no motion of the model leads there.
     """
 
     name: str
@@ -37,23 +37,6 @@ class Motion:
     alone: bool = False
 
 
-class Coupling(NamedTuple):
-    """An active joint equality: q = qpos0 + Σ cᵢ xⁱ, x the leader's q − qpos0; leader -1: x = 0."""
-
-    joint: int
-    leader: int
-    coefficients: Array  # (5,)
-
-
-def read_couplings(model: mujoco.MjModel) -> list[Coupling]:
-    """Return the active joint equalities of a model, in its order."""
-    return [
-        Coupling(int(model.eq_obj1id[i]), int(model.eq_obj2id[i]), model.eq_data[i, :5].copy())
-        for i in range(model.neq)
-        if int(model.eq_type[i]) == int(mujoco.mjtEq.mjEQ_JOINT) and model.eq_active0[i]
-    ]
-
-
 class PoseMaker:
     """Makes poses of a model around a base pose qpos (nq,), in which coupled joints are put where they follow."""
 
@@ -62,8 +45,9 @@ class PoseMaker:
         self.base = np.array(base, dtype=np.float64)
         self.number = number
         self.rng = np.random.default_rng(seed)
-        self._couplings = read_couplings(model)
-        self._follow(self.base, np.zeros(model.nv), -1)
+        self._coupled = CoupledJoints(model)
+        self._without = {-1: self._coupled}  # by the joint that is swept although it follows another one
+        self._coupled.place(self.base)
 
     def joints(self) -> list[int]:
         """Return the joints that can be swept: all but free ones."""
@@ -71,7 +55,7 @@ class PoseMaker:
 
     def follows(self, joint: int) -> bool:
         """Return whether an equality puts a joint where another one wants it, or at a place of its own."""
-        return any(joint == coupling.joint for coupling in self._couplings)
+        return joint in self._coupled.leader
 
     def axes(self, joint: int) -> range:
         """Return the axes to sweep a joint about: three for a ball."""
@@ -83,7 +67,7 @@ class PoseMaker:
         for joint in self.joints():
             if int(self.model.jnt_type[joint]) != _BALL:
                 qpos[self.model.jnt_qposadr[joint]] = 0.5 * sum(self.span(joint))
-        self._follow(qpos, np.zeros(self.model.nv), -1)
+        self._coupled.place(qpos)
         return qpos
 
     def span(self, joint: int) -> tuple[float, float]:
@@ -113,30 +97,22 @@ class PoseMaker:
         else:
             qpos[adr] = value
             tangent[dof] = 1.0
-        self._follow(qpos, tangent, joint)
+        couplings = self._couplings(joint)
+        couplings.place(qpos)
+        couplings.spread(qpos, tangent)
         return qpos, tangent
 
-    def _follow(self, qpos: Array, tangent: Array, swept: int) -> None:
-        """Put coupled joints where their polynomials want them; the swept joint stays."""
-        model = self.model
-        for _ in range(2):  # a follower may lead another
-            for joint, leader, c in self._couplings:
-                if joint == swept:
-                    continue
-                adr = int(model.jnt_qposadr[joint])
-                if leader < 0:
-                    qpos[adr] = model.qpos0[adr] + c[0]
-                    continue
-                leader_adr = int(model.jnt_qposadr[leader])
-                x = qpos[leader_adr] - model.qpos0[leader_adr]
-                qpos[adr] = model.qpos0[adr] + float(np.polynomial.polynomial.polyval(x, c))
-                slope = float(np.polynomial.polynomial.polyval(x, c[1:] * np.arange(1, 5)))
-                tangent[model.jnt_dofadr[joint]] = slope * tangent[model.jnt_dofadr[leader]]
+    def _couplings(self, swept: int = -1) -> CoupledJoints:
+        """Return the coupled joints, of which the one that is swept follows none."""
+        free = swept if swept in self._coupled.leader else -1
+        if free not in self._without:
+            self._without[free] = CoupledJoints(self.model, free)
+        return self._without[free]
 
     def _velocities(self, count: int) -> Array:
         return self.rng.uniform(-1.0, 1.0, (count, self.model.nv))
 
-    def sweep(self, joint: int, samples: int, axis: int = 0) -> Motion:
+    def sweep(self, joint: int, samples: int, axis: int = 0) -> PoseSequence:
         """Return a sweep of one joint over its range; the others stay, or follow where they are coupled to it.
 
         A joint that follows another one is moved alone.
@@ -149,13 +125,13 @@ class PoseMaker:
             name = f"{name} ({'xyz'[axis]})"
         qpos, tangent = (np.array(part) for part in zip(*pairs, strict=True))
         velocities, alone = self._velocities(samples), self.follows(joint)
-        return Motion(name, at, qpos, tangent, velocities, True, self.number, alone)
+        return PoseSequence(name, at, qpos, tangent, velocities, True, self.number, alone)
 
     def maker(self, joint: int, axis: int = 0) -> Callable[[float], tuple[Array, Array]]:
         """Return the function value -> (pose, tangent) of a sweep, for a closer look between its samples."""
         return lambda value: self.place(joint, axis, value)
 
-    def random(self, count: int) -> Motion:
+    def random(self, count: int) -> PoseSequence:
         """Return poses with every joint drawn from its range, on its own; free joints stay at the base pose."""
         model = self.model
         qpos = np.tile(self.base, (count, 1))
@@ -169,8 +145,8 @@ class PoseMaker:
                     mujoco.mju_quatIntegrate(row[adr : adr + 4], turn, 1.0)
                 else:
                     row[adr] = self.rng.uniform(low, high)
-            self._follow(row, np.zeros(model.nv), -1)
-        return Motion(
+            self._coupled.place(row)
+        return PoseSequence(
             "random poses",
             np.arange(count, dtype=np.float64),
             qpos,

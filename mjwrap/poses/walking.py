@@ -1,4 +1,4 @@
-"""Sweeps as a smooth motion makes them, every pose from the branch of the one before, and the jumps along them."""
+"""Takes muscles through a sweep as a smooth motion would, each pose from the path of the one before; finds jumps."""
 
 from __future__ import annotations
 

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from mjwrap.errors import RecordingError
+from mjwrap.model.couplings import read_couplings
+from mjwrap.model.kinematic_tree import crossed_dofs
 
 MOST, LEAST = 12, 4  # groups that are made where none are given, and muscles in each but the last
 OTHERS = "others"
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
-_JOINT_EQUALITY = 2  # mjEQ_JOINT
 _AXES = {FREE: ("x", "y", "z", "rx", "ry", "rz"), BALL: ("rx", "ry", "rz")}
 
 Ints = npt.NDArray[np.int64]
@@ -111,22 +112,9 @@ def _owners(model: Any, counts: Ints, least: int) -> Ints:
 def crossed_coordinates(
     model: Any, declarations: Sequence[Any], joint_names: Sequence[str]
 ) -> list[Coordinate]:
-    """Every coordinate that some muscle crosses: that moves some of the bodies on its route and not all."""
-    moves = np.zeros((model.nbody, model.nv), dtype=np.bool_)
-    for body in range(1, model.nbody):
-        moves[body] = moves[model.body_parentid[body]]
-        first = int(model.body_dofadr[body])
-        moves[body, first : first + int(model.body_dofnum[body])] = True
-    crossing = np.zeros((len(declarations), model.nv), dtype=np.bool_)
-    for i, muscle in enumerate(declarations):
-        sites = [muscle.origin_site, muscle.insertion_site, *muscle.via_sites]
-        bodies = [*model.site_bodyid[sites], *model.geom_bodyid[muscle.geoms]]
-        crossing[i] = moves[bodies].any(axis=0) & ~moves[bodies].all(axis=0)
-    followers = {
-        int(model.eq_obj1id[i])
-        for i in range(model.neq)
-        if model.eq_type[i] == _JOINT_EQUALITY and model.eq_active0[i]
-    }
+    """Every coordinate that some muscle crosses, see `crossed_dofs`."""
+    crossing = crossed_dofs(model, declarations)
+    followers = {coupling.joint for coupling in read_couplings(model)}
     found = []
     for dof in np.flatnonzero(crossing.any(axis=0)):
         joint = int(model.dof_jntid[dof])

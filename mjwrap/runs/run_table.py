@@ -14,6 +14,7 @@ from mjwrap.files import RowWriter, Table
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.writing import save_npz
 from mjwrap.mjcf import MuscleDeclaration, act_names, dof_names, qpos_names
+from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.runs.excitation import control_names
 from mjwrap.system import MuscleSystem
 
@@ -69,25 +70,8 @@ def _moment_arms(model: mujoco.MjModel, muscles: MuscleSystem) -> Column:
 
 
 def spanned(model: mujoco.MjModel, muscle: MuscleDeclaration) -> list[int]:
-    """Return the dofs that move some, but not all, of the bodies that one of a muscle's routes runs over."""
-    found: set[int] = set()
-    for route in muscle.routes:
-        sites = [route.origin, route.insertion, *(node.site for node in route.nodes if node.site >= 0)]
-        bodies = [int(model.site_bodyid[s]) for s in sites]
-        bodies += [int(model.geom_bodyid[node.geom]) for node in route.nodes if node.geom >= 0]
-        chains = [_chain(model, body) for body in bodies]
-        found |= set.union(*chains) - set.intersection(*chains)
-    return sorted(found)
-
-
-def _chain(model: mujoco.MjModel, body: int) -> set[int]:
-    """Return the dofs that move a body."""
-    found: set[int] = set()
-    while body > 0:
-        first = int(model.body_dofadr[body])
-        found |= set(range(first, first + int(model.body_dofnum[body])))
-        body = int(model.body_parentid[body])
-    return found
+    """Return the dofs that a muscle crosses."""
+    return [int(dof) for dof in np.flatnonzero(crossed_dofs(model, [muscle])[0])]
 
 
 class RunTable:

@@ -1,4 +1,4 @@
-"""MuJoCo's control callback, borrowed for the length of a step.
+"""Sets MuJoCo's control callback for the length of a step.
 
 The callback belongs to the whole process, so several threads that step at the same time share one: it finds the step
 that it belongs to by the address of the data. The last step to end gives the callback back to whoever had it before.

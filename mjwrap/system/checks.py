@@ -1,4 +1,4 @@
-"""Is the state of a simulation finite, and did MuJoCo reset it?"""
+"""Checks the state of a simulation: whether it is finite, whether MuJoCo reset it, which sites are inside surfaces."""
 
 from __future__ import annotations
 

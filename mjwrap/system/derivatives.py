@@ -1,4 +1,4 @@
-"""How the length Jacobian of a MuscleSystem changes along a motion."""
+"""Computes how the length Jacobian of a MuscleSystem changes along a motion."""
 
 from __future__ import annotations
 

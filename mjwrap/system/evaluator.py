@@ -1,4 +1,4 @@
-"""What a MuscleSystem is made of, and how one evaluation goes; `muscle_system.py` says when."""
+"""Evaluates the muscles of a MuscleSystem; `muscle_system.py` says at which state and when."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class Evaluator(Results):
             )
         self.strict = strict
         self._takeover = Takeover(model)
-        with self._takeover.suspended():
+        with self._takeover.original_limits():
             found = read_declarations(model)
         plan = build_plan(model, found.muscles)
         super().__init__(found, plan, model, State(model, plan))
-        self._takeover.silence([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
+        self._takeover.disable([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
         self._states: dict[int, State] = {}
         self._groups_off = 0
         self._off: NDArray[np.bool_] = np.zeros(plan.n, dtype=np.bool_)
@@ -64,7 +64,7 @@ class Evaluator(Results):
         self._excitation[:] = given
 
     def _state(self, data: mujoco.MjData) -> State:
-        if self._takeover.lost():
+        if self._takeover.was_released():
             raise ModelError(
                 "the actuators of this model pull by themselves again (release); build a new MuscleSystem to go on"
             )

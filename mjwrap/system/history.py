@@ -1,4 +1,4 @@
-"""What the muscles of a model were at many times: kept as it was at each, and put in order by muscle together."""
+"""Keeps what the muscles of a model were at many times, and sorts it by muscle when it is asked for."""
 
 from __future__ import annotations
 

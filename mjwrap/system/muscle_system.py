@@ -1,4 +1,4 @@
-"""MuscleSystem: the only reader and writer of mjData.
+"""`MuscleSystem`: drives the muscles of a model step by step; only this module reads and writes mjData.
 
 Forces belong to the state at which they act, at every stage of the integrator. So `step` evaluates the muscles between
 MuJoCo's position and acceleration stages, and under RK4 in a control callback that lives only as long as the step.

@@ -1,4 +1,4 @@
-"""What can be asked of a MuscleSystem after an evaluation: numbers per muscle, and its paths in space."""
+"""Gives the results of an evaluation: numbers of each muscle, and its path in space."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from mjwrap.kernels.coupling import drawn_paths, muscle_paths
 from mjwrap.kernels.solved import segments
 from mjwrap.kernels.spans import end_inside
 from mjwrap.mjcf import Declarations, MuscleDeclaration
-from mjwrap.model.arrays import Plan, last_dofs
+from mjwrap.model.arrays import Plan
+from mjwrap.model.kinematic_tree import last_dofs
 from mjwrap.paths import Status
 from mjwrap.system.history import History
 from mjwrap.system.state import Evaluation

@@ -1,4 +1,4 @@
-"""What belongs to one mjData: results, warm starts, and what was added to its xfrc_applied."""
+"""Holds what belongs to one mjData: results, warm starts, and what was added to its xfrc_applied."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from mjwrap.comparison.tables import Beside
 from mjwrap.comparison.twins import Batch, Twin
 from mjwrap.comparison.verdict import differences, outcomes, slope
 from mjwrap.files.atomic import PartFile
-from mjwrap.poses.joint_sweeps import Motion
+from mjwrap.poses.joint_sweeps import PoseSequence
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ class PoseRows:
                 if twin.mjwrap is not None:
                     self._add(batch.motion, twin)
 
-    def _add(self, motion: Motion, twin: Twin) -> None:
+    def _add(self, motion: PoseSequence, twin: Twin) -> None:
         native, mine = twin.native, twin.mjwrap
         assert mine is not None
         found, gaps = outcomes(twin, motion.continuous), differences(native, mine)
@@ -80,7 +80,7 @@ class PoseRows:
         return f"{self.rows} of {self.of} rows, {size}; all of them with --csv-all"
 
 
-def _moment_arms(motion: Motion, twin: Twin, dofs: list[str]) -> tuple[list[str], Array]:
+def _moment_arms(motion: PoseSequence, twin: Twin, dofs: list[str]) -> tuple[list[str], Array]:
     """Return about what (T,), and MuJoCo's and mjwrap's moment arms (2, T) [m]."""
     native, mine = twin.native, twin.mjwrap
     assert mine is not None

@@ -1,1 +1,1 @@
-"""An instance's block of memory: its first contents, and what of the model it follows."""
+"""Makes the block of memory of each instance: its first contents, its allocation, and what it follows of the model."""

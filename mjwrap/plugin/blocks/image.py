@@ -1,4 +1,4 @@
-"""The first contents of a block, written from the compiled model that it is to serve."""
+"""Writes the first contents of a block from the compiled model that it belongs to."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mjwrap.kernels.musculotendon import mujoco_muscle
 from mjwrap.kernels.musculotendon.tension import MUJOCO
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.blocks.transmission_part import transmission_part
 from mjwrap.plugin.blocks.watch import Watch, watch
@@ -61,8 +62,8 @@ def _arrays(
     params = np.array(plan.params)
     for m, (muscle, law) in enumerate(zip(muscles, plan.law, strict=True)):
         if muscle.actuator >= 0 and law == MUJOCO:  # its limits as the marks that `follow.py` compares
-            marks = model.actuator_gainprm[muscle.actuator, -1], model.actuator_biasprm[muscle.actuator, -1]
-            params[m, mujoco_muscle.LIMITS : mujoco_muscle.LIMITS + 2] = marks
+            limits = limit_marks(model, muscle.actuator)
+            params[m, mujoco_muscle.LIMITS : mujoco_muscle.LIMITS + 2] = limits
     arrays |= {
         "params": params,
         "group": np.array(groups, dtype=np.int64),
@@ -99,7 +100,7 @@ def block_image(
     free: int,
     rebuild: int,
 ) -> bytes:
-    """Return the block for an instance of the plugin; free, rebuild: addresses of functions in `register.py`."""
+    """Return the block for an instance of the plugin; free, rebuild: addresses of functions."""
     watched = watch(model, plan, muscles)
     head = np.zeros(bk.HEAD, dtype=np.int64)
     head[bk.MUSCLES], head[bk.NODES], head[bk.ROUTES] = plan.n, len(plan.node), len(plan.routes)

@@ -1,4 +1,4 @@
-"""What an instance of the plugin needs to give actuators length, velocity and moment, written from a compiled model."""
+"""Writes the part of a block with which actuators get length, velocity and moment along mjwrap's paths."""
 
 from __future__ import annotations
 
@@ -11,22 +11,14 @@ from numpy.typing import NDArray
 from mjwrap.errors import ModelError
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.mjcf import MuscleDeclaration, name_of
-from mjwrap.model.arrays import Plan, last_dofs
+from mjwrap.model.arrays import Plan
+from mjwrap.model.kinematic_tree import last_dofs, moving_dofs
 from mjwrap.plugin.callbacks import transmission as tr
 from mjwrap.plugin.mujoco_c.offsets import offsets
-from mjwrap.plugin.spec.placeholders import is_measured_late, shown_tendons
+from mjwrap.plugin.spec.tendon_uses import is_measured_late, shown_tendons
 
 Ints = NDArray[np.int64]
 OBJ = mujoco.mjtObj
-
-
-def _moved_by(model: mujoco.MjModel, last: Ints, body: int) -> set[int]:
-    """Return the dofs that move a body."""
-    dofs, dof = set(), int(last[body])
-    while dof >= 0:
-        dofs.add(dof)
-        dof = int(model.dof_parentid[dof])
-    return dofs
 
 
 def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
@@ -36,16 +28,16 @@ def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
     return {int(dof) for dof in model.ten_J_colind[first : first + int(model.ten_J_rownnz[tendon])]}
 
 
-def check_room(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> None:
+def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> None:
     """Raise `ModelError` for a muscle whose path changes with a dof for which its actuator's moment has no room."""
-    last = last_dofs(model)
+    moves = moving_dofs(model)
     for route in plan.routes:
         muscle = muscles[int(route[muscle_paths.R_MUSCLE])]
         if plan.output[route[muscle_paths.R_MUSCLE]] < 0:
             continue
         stops = plan.links[route[muscle_paths.R_LO] : route[muscle_paths.R_HI], muscle_paths.L_BODY].tolist()
         bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
-        moved = {body: _moved_by(model, last, body) for body in bodies}
+        moved = {body: set(np.flatnonzero(moves[body]).tolist()) for body in bodies}
         room = _columns(model, muscle.actuator) | set.intersection(*moved.values())
         for body, dofs in moved.items():
             if not dofs <= room:
@@ -87,7 +79,7 @@ def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDec
     head[tr.COUNT] = np.count_nonzero(plan.output >= 0)
     if not head[tr.COUNT]:
         return head
-    check_room(model, plan, muscles)
+    check_moment_columns(model, plan, muscles)
     shown = shown_tendons(model, muscles)
     pulled = [int(model.actuator_trnid[m.actuator, 0]) if m.actuator >= 0 else -1 for m in muscles]
     tendons = np.array(

@@ -1,7 +1,7 @@
-"""What of an mjModel the muscles' arrays were made from, as lists of regions that `callbacks/follow.py` compares.
+"""Lists the regions of an mjModel from which the muscles' arrays were made, for `callbacks/follow.py` to compare.
 
-Numbers of a living model are followed; names and texts count for new mjData only, and so do ids and kinds, unless
-another model comes to the same mjData.
+Where numbers there are changed while the model is in use, the muscles change with them. Changed names and texts count
+for new mjData only, and so do ids and kinds, unless another model is used with the same mjData.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What MuJoCo calls, compiled: numba functions on raw addresses, in which no Python runs."""
+"""Compiled callbacks, which MuJoCo calls: numba functions on raw addresses, in which no Python runs."""

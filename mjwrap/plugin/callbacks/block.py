@@ -1,4 +1,4 @@
-"""The block: all that one instance of the plugin needs of memory for one mjData, in one piece.
+"""The layout of a block: the memory that one instance of the plugin has for one mjData, in one piece.
 
 It holds a copy of the muscles' arrays (`mjwrap/model/arrays.py`), scratch memory of the kernels and what was added to
 xfrc_applied, so that nothing is shared between threads and nothing outlives its mjData. Its head is an array of words:

@@ -1,4 +1,4 @@
-"""Muscles as geoms of an mjvScene: what MuJoCo's viewers and its renderer draw beside the model.
+"""Draws muscles as geoms of an mjvScene, which MuJoCo's viewers and its renderer show beside the model.
 
 A path is drawn as MuJoCo draws a tendon: capsules of the tendon's width, colour, material and group, or those of a new
 tendon where the muscle has none; the default grey gives way to the colour of the muscle's activation. Where actuators
@@ -17,6 +17,7 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels.coupling.drawn_paths import route_contacts, route_points
 from mjwrap.kernels.coupling.muscle_paths import R_MUSCLE, ROUTE
 from mjwrap.kernels.solved import segments as sg
+from mjwrap.mjcf.marks import HIDDEN_BELOW, HIDDEN_FACTOR
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import (
@@ -34,8 +35,6 @@ from mjwrap.plugin.callbacks.saving import floats, ints, sizes
 from mjwrap.plugin.callbacks.stage import GROUPS as SWITCHES
 
 WIDTH = 0.003  # of a muscle without a tendon [m]: MuJoCo's default
-THINNED = 2.0**-26  # factor on the width of a tendon that MuJoCo is not to show, see `placeholders.py`
-THIN = 1e-7  # a width below this is a thinned one [m]
 BEAD = 1.5  # radius of a contact point [widths]
 ROOM = 4096  # points of a path for which there is room at first
 GROUPS = 6  # mjNGROUP
@@ -58,7 +57,7 @@ def _shows(block, option, groups, group):
 @jit
 def width_of(width):
     """Return the width of a tendon as it was written."""
-    return width / THINNED if width < THIN else width
+    return width / HIDDEN_FACTOR if width < HIDDEN_BELOW else width
 
 
 @jit

@@ -1,4 +1,4 @@
-"""Following the numbers of a living mjModel: what changes in it counts from the next evaluation on.
+"""Keeps the muscles' arrays equal to the mjModel: a number changed there counts from the next evaluation on.
 
 MuJoCo's own muscle law and the limits of controls are compared with the model where the kernels read them, which costs
 no memory but the model's; `drives` says which actuator is whose. Of the rest the block keeps a copy of what the
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from mjwrap.kernels.musculotendon import mujoco_muscle as law
 from mjwrap.kernels.musculotendon.tension import PARAMS
+from mjwrap.mjcf.marks import COLUMN
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import call, octets, reals, store_word, word, words
@@ -82,7 +83,7 @@ def _copy(live, at, mine, to, count):
 def _laws(block, model):
     """Make MuJoCo's muscle laws and the limits of controls the model's.
 
-    Limits of force are the marks that `Takeover` leaves behind gainprm and biasprm; all numbers as words, to the bit.
+    Limits of force are the marks in gainprm and biasprm (`mjcf/marks.py`). All numbers as words, to the bit.
     """
     n = word(block + 8 * bk.MUSCLES)
     drives = words(block + word(block + 8 * bk.A_DRIVES), (n, DRIVE))
@@ -102,8 +103,8 @@ def _laws(block, model):
         if a < 0:
             continue
         changes = _match(gain, PRM * a, params, row, 9)
-        changes |= _match(gain, PRM * a + 9, params, row + law.LIMITS, 1)
-        changes |= _match(bias, PRM * a + 9, params, row + law.LIMITS + 1, 1)
+        changes |= _match(gain, PRM * a + COLUMN, params, row + law.LIMITS, 1)
+        changes |= _match(bias, PRM * a + COLUMN, params, row + law.LIMITS + 1, 1)
         changes |= _match(lengths, 2 * o, params, row + law.RANGE, 2)
         changes |= _match(acc0, o, params, row + law.ACC0, 1)
         changes |= _match(gear, GEARS * o, params, row + law.GEAR, 1)
@@ -114,8 +115,8 @@ def _laws(block, model):
         if changes == 0:
             continue
         _copy(gain, PRM * a, params, row, 9)
-        _copy(gain, PRM * a + 9, params, row + law.LIMITS, 1)
-        _copy(bias, PRM * a + 9, params, row + law.LIMITS + 1, 1)
+        _copy(gain, PRM * a + COLUMN, params, row + law.LIMITS, 1)
+        _copy(bias, PRM * a + COLUMN, params, row + law.LIMITS + 1, 1)
         _copy(lengths, 2 * o, params, row + law.RANGE, 2)
         _copy(acc0, o, params, row + law.ACC0, 1)
         _copy(gear, GEARS * o, params, row + law.GEAR, 1)

@@ -1,4 +1,4 @@
-"""The functions whose addresses stand in mjpPlugin: they find an instance's block and hand over to it.
+"""Compiles the functions whose addresses stand in mjpPlugin: each finds its instance's block and works on it.
 
 A mjData without a block is left alone: while a model compiles, MuJoCo steps data that no plugin has initialised, and
 there plugin_data holds whatever was in memory before; only mjData.nplugin tells.
@@ -18,8 +18,8 @@ from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st
 from mjwrap.plugin.callbacks._cache import callback, jit
+from mjwrap.plugin.callbacks.block_table import block_at, block_of_state, place_of, remove_entry
 from mjwrap.plugin.callbacks.memory import call, call_with_four, store_word, word
-from mjwrap.plugin.callbacks.owners import block_at, block_of_state, leave, place_of
 
 _WORD, _INT = types.int64, types.int32
 
@@ -83,7 +83,7 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
         if place != 0:
             block = block_at(place)
             store_word(word(data + plugin_data) + 8 * instance, 0)
-            leave(place)
+            remove_entry(place)
             call(word(block + 8 * bk.FREE), block, 0, 0)
 
     def copy(target, model, origin, instance):
@@ -98,7 +98,7 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
     def reset(model, state, place, instance):
         block = block_of_state(place, instance, state) if place != 0 else 0
         if block != 0:
-            st.forget(block, state)
+            st.restart(block, state)
 
     def compute(model, data, instance, capability):
         block = _block(data, instance, nplugin, plugin_data)

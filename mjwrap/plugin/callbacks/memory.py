@@ -1,4 +1,4 @@
-"""Raw memory in compiled code: words and arrays at an address, calls of a function by its address."""
+"""Reads and writes memory at addresses in compiled code, and calls functions by their addresses."""
 
 from __future__ import annotations
 

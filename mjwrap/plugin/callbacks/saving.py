@@ -1,4 +1,4 @@
-"""An instance's part of plugin_state, and how the block's arrays are read from it and written to it.
+"""Reads the arrays of a block from an instance's part of plugin_state, and writes them there.
 
 Numbers in plugin_state, per instance: the time at which the last step ended; activation and fibre length of muscles
 that keep them nowhere else (n, 2); excitations (n,); length, velocity and tension (3, n) and the segments of the last

@@ -1,4 +1,4 @@
-"""One evaluation of an instance's muscles inside MuJoCo, and the end of a step.
+"""Evaluates an instance's muscles inside MuJoCo, and ends a step.
 
 `stage` and `finish` are compiled in `hooks.py`, as C functions only: another layer would optimise all kernels again.
 """
@@ -44,7 +44,7 @@ def _forces(block, data):
 
 
 @jit
-def _retreat(block, data, state):
+def _remove_wrenches(block, data, state):
     """Take out of xfrc_applied what this instance put in, or what a restored state says that it had."""
     xfrc, others, mine, total, written = _forces(block, data)
     loaded = ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
@@ -66,7 +66,7 @@ def _retreat(block, data, state):
 
 
 @jit
-def _advance_into(block, data, state, wrench):
+def _add_wrenches(block, data, state, wrench):
     """Put the wrench into xfrc_applied and note in plugin_state what is there now."""
     xfrc, others, mine, total, written = _forces(block, data)
     put(xfrc, others, mine, total, written, wrench)
@@ -82,7 +82,7 @@ def _advance_into(block, data, state, wrench):
 
 
 @jit
-def _erase(block):
+def _erase_paths(block):
     """Leave no path to draw; those that the next evaluation needs are in plugin_state."""
     count = ints(block, bk.A_COUNT, (word(block + 8 * bk.ROUTES),))
     for c in range(count.shape[0]):
@@ -90,7 +90,7 @@ def _erase(block):
 
 
 @jit
-def _since(time, step, ended, clock):
+def _time_since_start(time, step, ended, clock):
     """Return how long ago the step began [s] to which this stage of Runge-Kutta belongs.
 
     A stage's time is computed as the step's start plus half or all of a step, so it is recognised to the bit.
@@ -109,19 +109,19 @@ def _since(time, step, ended, clock):
 def stage(block, model, data):
     """Evaluate the instance's muscles at the poses and velocities in mjData, and act: by wrenches or transmission."""
     state = state_of(block, data)
-    _retreat(block, data, state)
+    _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
     part = block + word(block + 8 * bk.A_TRANSMISSION)
     transmits = word(part) != 0
     idle = half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION) != 0
     if idle and not transmits:
         clock[bk.ACTED] = 0.0
-        _erase(block)
+        _erase_paths(block)
         return
     n, _, _, bodies = sizes(block)
     step, since, ahead = real(model + word(block + 8 * bk.TIMESTEP)), 0.0, 0.0
     if half(model + word(block + 8 * bk.INTEGRATOR)) == word(block + 8 * bk.RUNGE_KUTTA):
-        since = _since(real(data + word(block + 8 * bk.TIME)), step, state[0], clock)
+        since = _time_since_start(real(data + word(block + 8 * bk.TIME)), step, state[0], clock)
     else:
         ahead = step
     if since == 0.0:
@@ -145,7 +145,7 @@ def stage(block, model, data):
     lost = flags(block + word(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
         lost[m] = states.status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
-    _advance_into(block, data, state, wrench)
+    _add_wrenches(block, data, state, wrench)
     if transmits:
         transmit(part, block, model, data, since == 0.0, routes, poses, paths, states)
     clock[bk.ACTED] = 1.0
@@ -154,7 +154,7 @@ def stage(block, model, data):
 def finish(block, model, data):
     """End a step: leave others' forces in xfrc_applied, keep states and warm starts in plugin_state."""
     state = state_of(block, data)
-    _retreat(block, data, state)
+    _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
     clock[bk.FIRST] = -1.0
     state[0] = real(data + word(block + 8 * bk.TIME))
@@ -178,7 +178,7 @@ def finish(block, model, data):
 
 
 @jit
-def forget(block, state):
+def restart(block, state):
     """After a reset of mjData, which has cleared xfrc_applied: start cold, with nothing to take back.
 
     state: address of the instance's numbers in plugin_state, which MuJoCo leaves as they were, or undefined.
@@ -186,7 +186,7 @@ def forget(block, state):
     cold = reals(state, (word(block + 8 * bk.NSTATE),))
     for i in range(cold.shape[0]):
         cold[i] = 0.0
-    _erase(block)
+    _erase_paths(block)
     n, _, _, bodies = sizes(block)
     failures = ints(block, bk.A_FAILURES, (n,))
     for m in range(n):

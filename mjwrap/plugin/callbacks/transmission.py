@@ -1,4 +1,4 @@
-"""Transmission: actuators of MuJoCo's own get length, velocity and moment along mjwrap's paths.
+"""Gives MuJoCo's own actuators length, velocity and moment along mjwrap's paths.
 
 MuJoCo computes these three in its position and velocity stages, then passive forces, at which the plugin is called, and
 only then the forces of actuators: so what is written in between is what gain, bias, clamps, sensors of velocity and

@@ -1,1 +1,1 @@
-"""MuJoCo's C library: its functions, where the fields of its structs lie, and copies of its models."""
+"""Reaches into MuJoCo's C library: its functions, the layout of its structs, copies of its models."""

@@ -1,4 +1,4 @@
-"""Copies of a model of which only the address is known, to read its declarations from.
+"""Copies a model of which only the address is known, to read its declarations from.
 
 MuJoCo makes a copy by writing the model in its binary form and reading that again, which takes most of a second for
 large meshes. So the copy of a model that comes twice is kept, and takes over the arrays of others of the same sizes.

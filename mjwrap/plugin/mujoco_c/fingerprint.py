@@ -1,4 +1,4 @@
-"""A hash of what the plugin reads of a model, without copying it: models of the same hash share their muscles' arrays.
+"""Hashes what the plugin reads of a model, without copying it; models of one hash share their muscles' arrays.
 
 The arrays of an mjModel lie one after the other in one buffer, so each ends where the next begins. Meshes, textures and
 the like, nearly all of its bytes, are left out: no muscle depends on them.

@@ -1,4 +1,4 @@
-"""MuJoCo's own C library, the one that the Python bindings use, through ctypes."""
+"""Loads MuJoCo's own C library, the one that the Python bindings use, through ctypes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Where the fields of MuJoCo's C structs lie in the installed MuJoCo, found and verified when first needed.
+"""Finds where the fields of MuJoCo's C structs lie in the installed MuJoCo, and verifies it, when first needed.
 
-Offsets move with almost every release. They are computed from the struct declarations that the mujoco package carries
-(`mujoco.introspect`) by the rules of C, then checked against living models and data, whose field addresses and values
+Offsets move with almost every release. ctypes computes them from the struct declarations that the mujoco package
+carries (`mujoco.introspect`); then they are checked against models and data in memory, whose field addresses and values
 the Python bindings show. A MuJoCo that passes is used; any other is refused before anything is written.
 """
 
@@ -15,15 +15,16 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from mjwrap.errors import VersionError
+from mjwrap.plugin.mujoco_c.refusal import refuse
 
-_POINTER = ctypes.sizeof(ctypes.c_void_p)
-_SIZES = {
-    "char": 1, "mjtByte": 1, "mjtBool": 1, "int": 4, "unsigned int": 4, "float": 4, "mjtNum": 8, "double": 8,
-    "mjtSize": 8, "int64_t": 8, "uint64_t": 8, "size_t": _POINTER, "uintptr_t": _POINTER,
+_TYPES: dict[str, Any] = {
+    "char": ctypes.c_char, "mjtByte": ctypes.c_ubyte, "mjtBool": ctypes.c_bool, "int": ctypes.c_int,
+    "unsigned int": ctypes.c_uint, "float": ctypes.c_float, "mjtNum": ctypes.c_double, "double": ctypes.c_double,
+    "mjtSize": ctypes.c_int64, "int64_t": ctypes.c_int64, "uint64_t": ctypes.c_uint64, "size_t": ctypes.c_size_t,
+    "uintptr_t": ctypes.c_size_t,
 }  # fmt: skip
 
-# pointers that the plugin follows, each verified; data_plugin_state and data_plugin_data: see `verify_plugin_fields`
+# pointers that the plugin follows, each verified; data_plugin_state and data_plugin_data: see `probe.py`
 MODEL_POINTERS = ("actuator_gear",)
 MODEL_PLUGIN_POINTERS = ("plugin_stateadr",)
 DATA_POINTERS = (
@@ -54,16 +55,11 @@ class ModelBuffer(NamedTuple):
     arrays: dict[str, int]
 
 
-def refuse(what: str) -> VersionError:
-    return VersionError(
-        f"the engine plugin cannot run in MuJoCo {mujoco.__version__}: {what}; MuscleSystem works without it"
-    )
-
-
-# --------------------------------------------------------------------------------- layout by the rules of C
+# ------------------------------------------------------------------------------------ layout, left to ctypes
 
 
 def structs() -> Any:
+    """Return the declarations of MuJoCo's structs by name."""
     try:
         from mujoco.introspect import structs
     except ImportError:
@@ -71,36 +67,37 @@ def structs() -> Any:
     return structs.STRUCTS
 
 
-def extent(kind: Any) -> tuple[int, int]:
-    """Return size and alignment [bytes] of a type as `mujoco.introspect` describes it."""
+def c_type(kind: Any) -> Any:
+    """Return the ctypes type of a type as `mujoco.introspect` describes it."""
     form = type(kind).__name__
     if form == "PointerType":
-        return _POINTER, _POINTER
+        return ctypes.c_void_p
     if form == "ArrayType":
-        size, alignment = extent(kind.inner_type)
-        return size * int(np.prod(kind.extents)), alignment
+        return c_type(kind.inner_type) * int(np.prod(kind.extents))
     if form == "AnonymousStructDecl":
-        return walk(kind.fields)[1:]
+        return structure(kind.fields)
     name = getattr(kind, "name", "")
-    if name in _SIZES:
-        return _SIZES[name], _SIZES[name]
+    if name in _TYPES:
+        return _TYPES[name]
     if name in structs():
-        return walk(structs()[name].fields)[1:]
+        return structure(structs()[name].fields)
     raise refuse(f"the type {name or form} in its structs is unknown")
 
 
-def walk(fields: Any) -> tuple[dict[str, int], int, int]:
-    """Return the offset of every field, the size and the alignment of a struct [bytes]."""
-    offsets: dict[str, int] = {}
-    here, widest = 0, 1
+def structure(fields: Any) -> type[ctypes.Structure]:
+    """Return the ctypes struct with the fields that `mujoco.introspect` lists; ctypes lays it out as C does."""
+    declared = []
     for field in fields:
         if type(field).__name__ != "StructFieldDecl":
             raise refuse(f"its structs contain a {type(field).__name__}")
-        size, alignment = extent(field.type)
-        here = -(-here // alignment) * alignment
-        offsets[field.name] = here
-        here, widest = here + size, max(widest, alignment)
-    return offsets, -(-here // widest) * widest, widest
+        declared.append((field.name, c_type(field.type)))
+    return type("Declared", (ctypes.Structure,), {"_fields_": declared})
+
+
+def field_offsets(fields: Any) -> tuple[dict[str, int], int]:
+    """Return the offset of every field of a struct, and its size [bytes]."""
+    kind = structure(fields)
+    return {field.name: getattr(kind, field.name).offset for field in fields}, ctypes.sizeof(kind)
 
 
 # ------------------------------------------------------------------------------------------- verification
@@ -143,7 +140,8 @@ def check_pointer(owner: Any, field: str, offset: int) -> None:
         raise refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
 
 
-def _check_value(owner: Any, field: str, kind: Any, offset: int, expected: float) -> None:
+def check_value(owner: Any, field: str, kind: Any, offset: int, expected: float) -> None:
+    """Raise unless the struct holds a number of a ctypes kind at `offset` that is the expected one."""
     found = kind.from_address(owner._address + offset).value
     if found != expected:
         raise refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
@@ -153,10 +151,12 @@ def _check_value(owner: Any, field: str, kind: Any, offset: int, expected: float
 def offsets() -> Offsets:
     """Return the offsets in the installed MuJoCo; `VersionError` where a field cannot be verified."""
     declared = structs()
-    if _POINTER != 8 or np.dtype(np.uintp).itemsize != 8:
+    if ctypes.sizeof(ctypes.c_void_p) != 8 or np.dtype(np.uintp).itemsize != 8:
         raise refuse("this is not a 64-bit process")
     try:
-        data, model, option = (walk(declared[s].fields)[0] for s in ("mjData", "mjModel", "mjOption"))
+        data, model, option = (
+            field_offsets(declared[s].fields)[0] for s in ("mjData", "mjModel", "mjOption")
+        )
         found = Offsets(
             {name: data[name] for name in ("time", "nplugin", *DATA_POINTERS, *PLUGIN_POINTERS)},
             {name: model[name] for name in (*MODEL_POINTERS, *MODEL_PLUGIN_POINTERS)}
@@ -169,17 +169,17 @@ def offsets() -> Offsets:
             check_pointer(state, field, found.data[field])
         for field in MODEL_POINTERS:
             check_pointer(living, field, found.model[field])
-        _check_value(state, "time", ctypes.c_double, found.data["time"], state.time)
+        check_value(state, "time", ctypes.c_double, found.data["time"], state.time)
         for name in OPTIONS:
             kind = ctypes.c_double if name == "timestep" else ctypes.c_int
-            _check_value(living, f"opt.{name}", kind, found.model[f"opt.{name}"], getattr(living.opt, name))
+            check_value(living, f"opt.{name}", kind, found.model[f"opt.{name}"], getattr(living.opt, name))
     return found
 
 
 def model_buffer() -> ModelBuffer:
     """Return where mjModel keeps its arrays; `VersionError` where one of them is elsewhere in a model of ours."""
     fields = structs()["mjModel"].fields
-    at = walk(fields)[0]
+    at = field_offsets(fields)[0]
     pointers = {
         f.name: at[f.name] for f in fields if type(f.type).__name__ == "PointerType" and f.name != "buffer"
     }
@@ -188,15 +188,5 @@ def model_buffer() -> ModelBuffer:
             shown = getattr(model, name, None)
             if isinstance(shown, np.ndarray) and shown.size:
                 check_pointer(model, name, offset)
-        _check_value(model, "nbuffer", ctypes.c_int64, at["nbuffer"], model.nbuffer)
+        check_value(model, "nbuffer", ctypes.c_int64, at["nbuffer"], model.nbuffer)
     return ModelBuffer(at["buffer"], at["nbuffer"], at["opt"], pointers)
-
-
-def verify_plugin_fields(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Verify the fields that only a model with plugins has: model needs two instances with states of their own."""
-    found = offsets()
-    for field in MODEL_PLUGIN_POINTERS:
-        check_pointer(model, field, found.model[field])
-    for field in PLUGIN_POINTERS:
-        check_pointer(data, field, found.data[field])
-    _check_value(data, "nplugin", ctypes.c_int, found.data["nplugin"], data.nplugin)

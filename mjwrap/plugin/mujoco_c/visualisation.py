@@ -1,4 +1,4 @@
-"""Where the fields of MuJoCo's visualisation structs lie, found and verified as in `offsets.py`.
+"""Finds where the fields of MuJoCo's visualisation structs lie, and verifies it, as `offsets.py` does.
 
 The Python bindings do not tell where a scene or its geoms are, so MuJoCo's own functions fill structs in memory of
 ours, and what is read there is compared with what the bindings show of the same scene.
@@ -19,7 +19,8 @@ from mjwrap.errors import VersionError
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks.drawing import GROUPS, LABEL
 from mjwrap.plugin.mujoco_c.library import library
-from mjwrap.plugin.mujoco_c.offsets import check_pointer, extent, refuse, structs, walk
+from mjwrap.plugin.mujoco_c.offsets import c_type, check_pointer, field_offsets, structs
+from mjwrap.plugin.mujoco_c.refusal import refuse
 
 _ARRAYS = (
     "tendon_width", "tendon_rgba", "tendon_group", "tendon_matid", "actuator_group",
@@ -74,8 +75,7 @@ class Drawing(NamedTuple):
 
 def _fields(name: str) -> tuple[dict[str, int], int]:
     """Return the offset of every field of a struct, and its size."""
-    offsets, size, _ = walk(structs()[name].fields)
-    return offsets, size
+    return field_offsets(structs()[name].fields)
 
 
 def _visual() -> dict[str, int]:
@@ -86,7 +86,7 @@ def _visual() -> dict[str, int]:
         ("rgba", ("actuator", "actuatornegative", "actuatorpositive", "contactpoint")),
         ("map", ("alpha", "actuatortendon")),
     ):
-        at, inner = _fields("mjVisual")[0][section], walk(sections[section].type.fields)[0]
+        at, inner = _fields("mjVisual")[0][section], field_offsets(sections[section].type.fields)[0]
         found |= {f"model.vis.{section}.{name}": start + at + inner[name] for name in names}
     return found
 
@@ -188,7 +188,7 @@ def _find() -> Drawing:
         _verify_scene(probe, _verify_option())
         label = {f.name: f for f in structs()["mjvGeom"].fields}["label"]
         light = [geom[name] - geom["emission"] for name in ("specular", "shininess", "reflectance")]
-        if extent(label.type)[0] != LABEL or size % 4 or light != [4, 8, 12]:
+        if ctypes.sizeof(c_type(label.type)) != LABEL or size % 4 or light != [4, 8, 12]:
             raise refuse("mjvGeom is laid out in another way")
     except (KeyError, AttributeError) as error:
         raise refuse(f"its visualisation structs differ ({error})") from None

@@ -1,1 +1,1 @@
-"""What `install` changes in an MjSpec, and how that is undone."""
+"""Changes an MjSpec, and the model compiled from it, for `install`, and undoes these changes."""

@@ -1,4 +1,4 @@
-"""An MjSpec as it was, where putting the plugin into it has failed."""
+"""Gives an MjSpec back what `install` has changed in it, where `install` fails."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import mujoco
 
-from mjwrap.plugin.register import NAME
+from mjwrap.plugin.spec.configuration import spec_instances
 
 _CLAMP = ("forcelimited", "forcerange", "gainprm", "biasprm")
 
@@ -21,7 +21,7 @@ def undone_on_error(spec: mujoco.MjSpec) -> Iterator[None]:
     actuators = [(each, [_kept(getattr(each, name)) for name in _CLAMP]) for each in spec.actuators]
     widths = [(each, each.width) for each in spec.tendons]
     bodies = [(each, each.sleep, each.plugin.active) for each in spec.bodies[1:]]
-    instances = [(each, dict(each.config)) for each in spec.plugins if each.plugin_name == NAME]
+    instances = [(each, dict(each.config)) for each in spec_instances(spec)]
     try:
         yield
     except BaseException:
@@ -36,7 +36,7 @@ def undone_on_error(spec: mujoco.MjSpec) -> Iterator[None]:
                 body.plugin.name = body.plugin.plugin_name = ""
                 body.plugin.active = False
         known = {each.name for each, _ in instances}
-        for element in [p for p in spec.plugins if p.plugin_name == NAME and p.name not in known]:
+        for element in [p for p in spec_instances(spec) if p.name not in known]:
             spec.delete(element)
         for element, config in instances:
             element.config = config

@@ -1,13 +1,4 @@
-"""Tendons that only say where a muscle of mjwrap runs: MuJoCo need not spend up to half of its step on them.
-
-A tendon whose number of stops (`tendon_num`) is 0 has no length, no Jacobian and no cost. The number itself is kept in
-`wrap_prm` of the first stop, which MuJoCo does not read for a site: so a copy of the model, or its MJB, knows it too.
-
-Where a tendon stays, MuJoCo would show it beside the path that the plugin draws. Its width is made too small to be
-seen, by a power of two, so that its own width can still be read from it: in the MjSpec, so that models compiled from
-it later, alone or attached, do not show it either. (The compiler takes no width of 0, and `to_xml` writes none below
-1e-12 m.)
-"""
+"""Tells which tendons MuJoCo needs besides the muscles that mjwrap drives, and which can show mjwrap's paths."""
 
 from __future__ import annotations
 
@@ -18,8 +9,6 @@ import numpy as np
 
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.muscles.laws import ActuatorForce
-from mjwrap.plugin.callbacks.drawing import THIN, THINNED
-from mjwrap.plugin.spec.resting import wake_actuators
 
 _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_ACTUATOR)
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
@@ -94,58 +83,23 @@ def _is_measured(model: mujoco.MjModel, kind: int, item: int, transmitted: bool)
     )
 
 
-def _is_idle(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown: set[int]) -> bool:
-    """Return whether all that pulls a tendon is taken over, and nobody needs its path besides.
+def is_needed(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown: set[int]) -> bool:
+    """Return whether MuJoCo needs a tendon's path: for forces, sensors, or an actuator that is not taken over.
 
-    taken: by actuator, whether it pulls along mjwrap's path, or no more. shown: tendons that show mjwrap's path.
+    taken: by actuator that is taken over, whether it pulls along mjwrap's path (else it is disabled). shown: tendons
+    that show mjwrap's path.
     """
     if _is_used(model, tendon) or int(model.wrap_type[model.tendon_adr[tendon]]) != _SITE:
-        return False
+        return True
     pulling = _pulling(model, tendon)
     if not pulling or not set(pulling) <= set(taken):
-        return False
+        return True
     if model.tendon_actfrclimited[tendon] and not all(taken[actuator] for actuator in pulling):
-        return False
+        return True
     if np.isin(model.sensor_type, _FORCES).any() and any(taken[actuator] for actuator in pulling):
-        return False  # MuJoCo lets them feel its actuators where its own tendons pull
+        return True  # MuJoCo lets them feel its actuators where its own tendons pull
     if any(taken[actuator] and _is_scaled(model, actuator) for actuator in pulling):
-        return False
-    return not (
-        _is_measured(model, _TENDON, tendon, tendon in shown)
-        or any(_is_measured(model, _ACTUATOR, actuator, taken[actuator]) for actuator in pulling)
+        return True
+    return _is_measured(model, _TENDON, tendon, tendon in shown) or any(
+        _is_measured(model, _ACTUATOR, actuator, taken[actuator]) for actuator in pulling
     )
-
-
-def drop_placeholders(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> None:
-    """Take the stops from the tendons of these muscles that nothing else needs."""
-    taken = {m.actuator: isinstance(m.parameters, ActuatorForce) for m in muscles if m.actuator >= 0}
-    shown = shown_tendons(model, muscles)
-    for tendon in {muscle.tendon for muscle in muscles if muscle.tendon >= 0}:
-        if model.tendon_num[tendon] > 0 and _is_idle(model, tendon, taken, shown):
-            model.wrap_prm[model.tendon_adr[tendon]] = model.tendon_num[tendon]
-            model.tendon_num[tendon] = 0
-
-
-def restore_placeholders(model: mujoco.MjModel) -> None:
-    """Give tendons their stops back, and muscle actuators that rest on them their curves."""
-    wake_actuators(model)
-    for tendon in np.flatnonzero(model.tendon_num == 0):
-        first = int(model.tendon_adr[tendon])
-        model.tendon_num[tendon] = int(model.wrap_prm[first])
-        model.wrap_prm[first] = 0.0
-
-
-def hide_placeholders(spec: mujoco.MjSpec, muscles: list[MuscleDeclaration]) -> None:
-    """Make the tendons of these muscles invisible; a width set again later is shown, and drawn by the plugin too."""
-    taken = {muscle.tendon for muscle in muscles}
-    for tendon in spec.tendons:
-        if tendon.id in taken and tendon.width >= THIN:
-            tendon.width *= THINNED
-
-
-def show_placeholder(spec: mujoco.MjSpec, actuator: str) -> None:
-    """Give the tendon that an actuator pulls the width back that `hide_placeholders` has taken from it."""
-    element = spec.actuator(actuator)
-    tendon = spec.tendon(element.target) if element is not None else None
-    if tendon is not None and tendon.width < THIN:
-        tendon.width /= THINNED

@@ -1,9 +1,9 @@
-"""Which block belongs to which mjData: a table that every callback asks, since plugin_data may be a copy.
+"""The table of all blocks: which block belongs to which instance of which mjData.
 
-Unpickling an mjData, here or in another process, copies the original's plugin_data over its own. So a slot holds no
-address, only the place of an entry in this table, from 1 on; an entry that is not the mjData's own says that the slot
-is a copy, and the right one is looked for and written there. `mjwrap/plugin/register.py` fills the table, under a
-lock; an entry without an owner is free.
+Unpickling an mjData, here or in another process, copies the original's plugin_data over its own. So a slot there holds
+no address, only the place of an entry in this table, from 1 on. Every callback checks that the entry belongs to its
+mjData; if not, the slot is a copy, and the right entry is looked for and its place written there.
+`mjwrap/plugin/blocks/table.py` fills the table, under a lock; an entry without an owner is free.
 """
 
 from __future__ import annotations
@@ -20,13 +20,9 @@ from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import half, intrinsic, store_word, word
 
 CAPACITY = 1 << 16  # entries
-OWNER, INSTANCE, BLOCK, ENTRY = (
-    0,
-    1,
-    2,
-    3,
-)  # words of an entry: address of the mjData or 0, instance, its block
-_SYMBOL = "mjwrap.plugin.owners"
+# words of an entry: address of the mjData or 0, instance, address of its block
+OWNER, INSTANCE, BLOCK, ENTRY = range(4)
+_SYMBOL = "mjwrap.plugin.block_table"
 
 
 def _table_of_the_process() -> Any:
@@ -94,7 +90,7 @@ def block_at(place):
 
 
 @jit
-def leave(place):
+def remove_entry(place):
     """Give an entry back."""
     store_word(_entry(place) + 8 * OWNER, 0)
 

@@ -1,0 +1,193 @@
+"""Writes and reads the private marks that mjwrap leaves in arrays of MuJoCo's own.
+
+MuJoCo has no place for another program's notes, and a model can be copied, pickled, saved as XML or MJB, or attached to
+another one. So what mjwrap must know again afterwards stands in entries that MuJoCo carries along and does not use:
+
+- `actuator_gainprm[i, 9]` and `actuator_biasprm[i, 9]`: the lowest and highest force that actuator i had before it was
+  disabled (∓mjMAXVAL: no limits). Written by `model/takeover.py` into a model and by `plugin/spec/actuators.py` into a
+  spec; read by both, `plugin/blocks/image.py` and `plugin/callbacks/follow.py`.
+- `actuator_forcerange[i]`, 0 to 0 in a model and 0 to 1e-12 in a spec: actuator i is disabled. By and for the same.
+- `actuator_dynprm[i, 9]`, 1: gain and bias of actuator i were a muscle's. By and for `plugin/spec/tendons.py`.
+- `wrap_prm[tendon_adr[t]]`, where `tendon_num[t]` is 0: how many stops tendon t had. By and for the same.
+- `tendon_width[t]` below 1e-7 m: hidden; its own width is 2²⁶ times that. Written by `plugin/spec/tendons.py`, read by
+  it and by `plugin/callbacks/drawing.py`.
+- the name of a plugin's instance, ending in "mjwrap": its configuration says what mjwrap drives. Written by
+  `plugin/spec/instance.py`, read by `plugin/spec/configuration.py`; a body names it too, so that `attach` keeps it.
+
+Why these are free in MuJoCo 3.11 to 4.0: a row of gainprm, biasprm or dynprm has 10 numbers (mjNGAIN, mjNBIAS, mjNDYN).
+Of the kinds of actuators that mjwrap takes over, fixed ones use 1, affine ones 3 and muscles 9 of gain and bias; a
+muscle's dynamics use 3 of dynprm. `wrap_prm` of a site is not read. A width is only drawn. `tests/test_marks.py` checks
+it against the installed MuJoCo.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+COLUMN = 9  # the last of gainprm, biasprm and dynprm
+PLUGIN_NAME = "mjwrap.muscles"  # of the engine plugin
+PLUGIN_INSTANCE = "mjwrap"  # of its instance, behind the prefix of the model that it was attached with
+# force range [N] of a disabled actuator in an MjSpec: the compiler accepts no 0 to 0, to_xml writes nothing smaller,
+# and a muscle's force is never positive, so it is clamped to zero
+DISABLED_RANGE = (0.0, 1e-12)
+HIDDEN_FACTOR = 2.0**-26  # on a tendon's width: a power of two, so that its own width comes back to the bit
+HIDDEN_BELOW = 1e-7  # [m] (to_xml writes no width below 1e-12 m, and the compiler takes none of 0)
+_CURVES = int(mujoco.mjtGain.mjGAIN_MUSCLE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
+_NO_CURVES = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtBias.mjBIAS_NONE)
+
+
+# ---------------------------------------------------------------------- the force limits of disabled actuators
+
+
+class ForceLimits(NamedTuple):
+    """Force limits of an actuator [N]; without limits, low and high are MuJoCo's largest number, ∓mjMAXVAL."""
+
+    limited: bool
+    low: float
+    high: float
+
+
+def _limits(limited: bool, low: float, high: float) -> ForceLimits:
+    if not limited:
+        low, high = -mujoco.mjMAXVAL, mujoco.mjMAXVAL
+    return ForceLimits(limited, float(low), float(high))
+
+
+def force_limits(model: mujoco.MjModel, actuator: int) -> ForceLimits:
+    """Return the force limits that an actuator has now."""
+    return _limits(bool(model.actuator_forcelimited[actuator]), *model.actuator_forcerange[actuator])
+
+
+def limit_marks(model: mujoco.MjModel, actuator: int) -> tuple[float, float]:
+    """Return the two marks of an actuator: lowest and highest force before it was disabled, 0 and 0 if it is not."""
+    return float(model.actuator_gainprm[actuator, COLUMN]), float(model.actuator_biasprm[actuator, COLUMN])
+
+
+def is_disabled(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether an actuator's force is clamped to 0."""
+    return bool(model.actuator_forcelimited[actuator]) and not model.actuator_forcerange[actuator].any()
+
+
+def disabled_actuators(model: mujoco.MjModel) -> dict[int, ForceLimits]:
+    """Return the disabled actuators of a model with the limits that each had before."""
+    marks = {i: limit_marks(model, i) for i in range(len(model.actuator_gainprm)) if is_disabled(model, i)}
+    return {
+        i: ForceLimits(high < mujoco.mjMAXVAL, low, high) for i, (low, high) in marks.items() if low < high
+    }
+
+
+def disable_force(model: mujoco.MjModel, actuator: int, limits: ForceLimits) -> None:
+    """Clamp an actuator's force to 0, and mark the limits that it had."""
+    model.actuator_gainprm[actuator, COLUMN], model.actuator_biasprm[actuator, COLUMN] = limits[1:]
+    model.actuator_forcelimited[actuator], model.actuator_forcerange[actuator] = 1, 0.0
+
+
+def enable_force(model: mujoco.MjModel, actuator: int, limits: ForceLimits) -> None:
+    """Give a disabled actuator its limits back, and remove the marks."""
+    model.actuator_gainprm[actuator, COLUMN] = model.actuator_biasprm[actuator, COLUMN] = 0.0
+    model.actuator_forcelimited[actuator] = limits.limited
+    model.actuator_forcerange[actuator] = limits[1:] if limits.limited else 0.0
+
+
+def disable_element(element: mujoco.MjsActuator, limits: ForceLimits) -> None:
+    """Do what `disable_force` does, to an actuator of an MjSpec."""
+    element.gainprm[COLUMN], element.biasprm[COLUMN] = limits[1:]
+    element.forcelimited, element.forcerange = 1, DISABLED_RANGE
+
+
+def enable_element(element: mujoco.MjsActuator) -> None:
+    """Do what `enable_force` does, to an actuator of an MjSpec; one that is not disabled stays as it is."""
+    if not np.array_equal(element.forcerange, DISABLED_RANGE):
+        return
+    low, high = float(element.gainprm[COLUMN]), float(element.biasprm[COLUMN])
+    limited = high < mujoco.mjMAXVAL
+    element.gainprm[COLUMN] = element.biasprm[COLUMN] = 0.0
+    element.forcelimited, element.forcerange = limited, (low, high) if limited else (0.0, 0.0)
+
+
+def zero_disabled_ranges(model: mujoco.MjModel) -> None:
+    """Make the force ranges of actuators that were disabled in an MjSpec 0 to 0, as in a model."""
+    disabled = (model.actuator_forcerange == DISABLED_RANGE).all(axis=1)
+    model.actuator_forcerange[disabled] = 0.0
+
+
+# ------------------------------------------------------------------------------------ the curves of muscle actuators
+
+
+def has_curves(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether gain and bias of an actuator are a muscle's, and its mark is free."""
+    return _kinds(model, actuator) == _CURVES and model.actuator_dynprm[actuator, COLUMN] == 0.0
+
+
+def lacks_curves(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether an actuator's curves were removed by `remove_curves`."""
+    return _kinds(model, actuator) == _NO_CURVES and model.actuator_dynprm[actuator, COLUMN] == 1.0
+
+
+def _kinds(model: mujoco.MjModel, actuator: int) -> tuple[int, int]:
+    return int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
+
+
+def remove_curves(model: mujoco.MjModel, actuator: int) -> None:
+    """Make gain and bias of a muscle actuator constants, which MuJoCo need not compute, and mark it."""
+    model.actuator_gaintype[actuator], model.actuator_biastype[actuator] = _NO_CURVES
+    model.actuator_dynprm[actuator, COLUMN] = 1.0
+
+
+def restore_curves(model: mujoco.MjModel, actuator: int) -> None:
+    """Make gain and bias a muscle's again, and remove the mark."""
+    model.actuator_gaintype[actuator], model.actuator_biastype[actuator] = _CURVES
+    model.actuator_dynprm[actuator, COLUMN] = 0.0
+
+
+# ----------------------------------------------------------------------------------------- the stops of spatial tendons
+
+
+def lacks_stops(model: mujoco.MjModel, tendon: int) -> bool:
+    """Return whether a tendon has no stops: MuJoCo computes neither length nor Jacobian of it."""
+    return int(model.tendon_num[tendon]) == 0
+
+
+def remove_stops(model: mujoco.MjModel, tendon: int) -> None:
+    """Take the stops from a tendon whose first one is a site, and mark there how many they were."""
+    model.wrap_prm[model.tendon_adr[tendon]] = model.tendon_num[tendon]
+    model.tendon_num[tendon] = 0
+
+
+def restore_stops(model: mujoco.MjModel, tendon: int) -> None:
+    """Give a tendon without stops its own back, and remove the mark."""
+    first = int(model.tendon_adr[tendon])
+    model.tendon_num[tendon] = int(model.wrap_prm[first])
+    model.wrap_prm[first] = 0.0
+
+
+# ---------------------------------------------------------------------------------------------- hidden tendons
+
+
+def hide_tendon(element: mujoco.MjsTendon) -> None:
+    """Make a tendon of an MjSpec too thin to be seen."""
+    if element.width >= HIDDEN_BELOW:
+        element.width *= HIDDEN_FACTOR
+
+
+def show_tendon(element: mujoco.MjsTendon) -> None:
+    """Give a tendon of an MjSpec the width back that `hide_tendon` has taken from it."""
+    if element.width < HIDDEN_BELOW:
+        element.width /= HIDDEN_FACTOR
+
+
+# ------------------------------------------------------------------------------------------ instances of the plugin
+
+
+def is_own_instance(name: str) -> bool:
+    """Return whether a plugin's instance has the name that mjwrap gives to its own, behind any prefix."""
+    return name.endswith(PLUGIN_INSTANCE)
+
+
+def own_instances(model: mujoco.MjModel) -> list[int]:
+    """Return the ids of mjwrap's instances in a model."""
+    names = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin))
+    return [i for i, name in enumerate(names) if is_own_instance(name)]

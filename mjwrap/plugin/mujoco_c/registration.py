@@ -1,0 +1,38 @@
+"""Registers engine plugins with MuJoCo, which keeps them until the process ends."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from mjwrap.plugin.mujoco_c.library import MjpPlugin, library
+
+_PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC
+
+
+def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str, ...] = ()) -> None:
+    """Register a plugin for passive forces unless one of this name is there already.
+
+    callbacks: numba or ctypes functions by their field in mjpPlugin; attributes: names of its configuration's texts.
+    """
+    lib, slot = library(), ctypes.c_int(-1)
+    if lib.mjp_getPlugin(name.encode(), ctypes.byref(slot)):
+        return
+    texts = (ctypes.c_char_p * max(1, len(attributes)))(*(text.encode() for text in attributes))
+    plugin = MjpPlugin(name=name.encode(), nattribute=len(attributes), attributes=texts)
+    plugin.capabilityflags, plugin.needstage = _PASSIVE, _STAGE_ACC
+    for field, function in callbacks.items():
+        setattr(plugin, field, address_of(function))
+        keep_forever(function)
+    keep_forever(plugin)
+    lib.mjp_registerPlugin(ctypes.byref(plugin))
+
+
+def keep_forever(thing: Any) -> None:
+    """Keep an object until the process ends, whatever happens to the module that made it."""
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
+
+
+def address_of(function: Any) -> int:
+    """Return the address at which C calls a numba or ctypes function."""
+    return int(getattr(function, "address", 0) or ctypes.cast(function, ctypes.c_void_p).value or 0)

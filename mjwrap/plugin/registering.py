@@ -1,0 +1,77 @@
+"""Makes the plugin known to MuJoCo, once a process.
+
+MuJoCo calls `nstate` while it compiles a model and `init` for every new mjData: the only callbacks in Python. Whatever
+they need they read from the model, whoever compiled it, in this process or another.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+import sys
+import threading
+
+from mjwrap.errors import VersionError
+from mjwrap.mjcf.marks import PLUGIN_NAME
+from mjwrap.plugin.blocks.allocation import entries, give_block
+from mjwrap.plugin.blocks.reading import is_reading
+from mjwrap.plugin.callbacks.hooks import compile_hooks
+from mjwrap.plugin.mujoco_c.offsets import offsets
+from mjwrap.plugin.mujoco_c.probe import verify_plugin_fields
+from mjwrap.plugin.mujoco_c.registration import register_plugin
+from mjwrap.plugin.mujoco_c.visualisation import drawing
+from mjwrap.plugin.spec.configuration import ATTRIBUTES, configuration_at
+
+_NSTATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int)
+_INIT = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
+_here = threading.local()  # .error: why a callback of this thread failed last
+
+
+@functools.cache
+def register() -> None:
+    """Make the plugin known to MuJoCo; `VersionError` where the installed MuJoCo cannot be verified."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        raise VersionError("the engine plugin needs compiled kernels; NUMBA_DISABLE_JIT is set")
+    offsets()
+    verify_plugin_fields()
+    drawing()  # warns here where it cannot
+    entries()
+    hooks = compile_hooks(offsets().data)
+    python = {"nstate": _NSTATE(_nstate), "init": _INIT(_init)}
+    register_plugin(PLUGIN_NAME, python | hooks._asdict(), ATTRIBUTES)
+
+
+def take_error() -> Exception | None:
+    """Return why a callback of this thread failed last, and forget it."""
+    error = getattr(_here, "error", None)
+    _here.error = None
+    return error
+
+
+def _failed(error: Exception) -> int:
+    _here.error = error
+    print(f"mjwrap: {error}", file=sys.stderr, flush=True)  # MuJoCo only says that an init failed
+    return -1
+
+
+def _nstate(model: int, instance: int) -> int:
+    """Return how many numbers of plugin_state an instance needs, -1 where that cannot be told."""
+    try:
+        return configuration_at(model, instance).numbers
+    except Exception as error:
+        return _failed(error)
+
+
+def _init(model: int, data: int, instance: int) -> int:
+    """Give a new mjData its block; what stood in its slot of plugin_data before is not defined."""
+    slots = ctypes.c_uint64.from_address(data + offsets().data["plugin_data"]).value
+    slot = ctypes.c_uint64.from_address(slots + 8 * instance)
+    slot.value = 0
+    if is_reading():
+        return 0
+    try:
+        slot.value = give_block(model, data, instance)
+    except Exception as error:
+        return _failed(error)
+    return 0

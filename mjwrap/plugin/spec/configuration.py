@@ -1,0 +1,64 @@
+"""Writes and reads what an instance of the plugin is to do: its configuration, which is part of the model itself.
+
+Names of muscles stand there without the prefixes that `attach` adds; the instance's own name has those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+from urllib.parse import quote, unquote
+
+import mujoco
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.marks import PLUGIN_INSTANCE, PLUGIN_NAME, is_own_instance
+from mjwrap.plugin.mujoco_c.library import library
+
+MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"
+ATTRIBUTES = (MUSCLES, NUMBERS, MODE)
+WRENCH, TRANSMISSION = "wrench", "transmission"
+MODES = (WRENCH, TRANSMISSION)
+
+
+class Configuration(NamedTuple):
+    """Names of the muscles that an instance drives, how many numbers of plugin_state it has, and its mode."""
+
+    muscles: list[str]
+    numbers: int
+    mode: str
+
+
+def configuration_texts(muscles: list[str], numbers: int, mode: str) -> dict[str, str]:
+    """Return a configuration as MuJoCo keeps it; names are quoted as in URLs, so that a space separates them."""
+    names = " ".join(quote(name, safe="/") for name in muscles)
+    return {MUSCLES: names, NUMBERS: str(numbers), MODE: mode}
+
+
+def parse_configuration(name: str, texts: Mapping[str, str]) -> Configuration:
+    """Return the configuration of an instance from its name and texts; `ModelError` where mjwrap did not write it."""
+    muscles, numbers, mode = (texts.get(key, "") for key in ATTRIBUTES)
+    if not is_own_instance(name) or not numbers.isdigit() or mode not in MODES:
+        raise ModelError(
+            f"plugin instance '{name}' was not made by mjwrap.install; leave it out and call install on the MjSpec"
+        )
+    prefix = name.removesuffix(PLUGIN_INSTANCE)
+    return Configuration([prefix + unquote(part) for part in muscles.split()], int(numbers), mode)
+
+
+def configuration_of(element: mujoco.MjsPlugin) -> Configuration:
+    """Return the configuration of an instance in an MjSpec."""
+    return parse_configuration(element.name, dict(element.config))
+
+
+def configuration_at(model: int, instance: int) -> Configuration:
+    """Return the configuration of an instance of the model at an address."""
+    lib = library()
+    name = lib.mj_id2name(model, int(mujoco.mjtObj.mjOBJ_PLUGIN), instance) or b""
+    texts = {key: lib.mj_getPluginConfig(model, instance, key.encode()) or b"" for key in ATTRIBUTES}
+    return parse_configuration(name.decode(), {key: text.decode() for key, text in texts.items()})
+
+
+def spec_instances(spec: mujoco.MjSpec) -> list[mujoco.MjsPlugin]:
+    """Return the instances of mjwrap's plugin in an MjSpec, those of attached models among them."""
+    return [element for element in spec.plugins if element.plugin_name == PLUGIN_NAME]

@@ -1,0 +1,73 @@
+"""Takes tendons that only say where a muscle runs out of MuJoCo's computation, hides them, and restores them.
+
+MuJoCo would spend up to half of its step on them. A tendon without stops has no length, no Jacobian and no cost. Where
+all that pulls it is disabled, the muscle curves of its actuators need not be computed either; their activations go on.
+This is done in the model that `install` returns only.
+
+A tendon that stays would be shown beside the path that the plugin draws. So it is made too thin to be seen: in the
+MjSpec, so that models compiled from it later, alone or attached, do not show it either.
+
+How each change is marked, so that a copy of the model can be read as it was: `mjwrap/mjcf/marks.py`.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mjwrap.mjcf import MuscleDeclaration, marks
+from mjwrap.muscles.laws import ActuatorForce
+from mjwrap.plugin.spec.tendon_uses import is_needed, shown_tendons
+
+_PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
+_MUSCLE_DYNAMICS = int(mujoco.mjtDyn.mjDYN_MUSCLE)
+
+
+def remove_unneeded_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> None:
+    """Take the stops from the tendons of these muscles that nothing else needs, and the curves from their actuators."""
+    taken = {m.actuator: isinstance(m.parameters, ActuatorForce) for m in muscles if m.actuator >= 0}
+    shown = shown_tendons(model, muscles)
+    for tendon in {muscle.tendon for muscle in muscles if muscle.tendon >= 0}:
+        if not marks.lacks_stops(model, tendon) and not is_needed(model, tendon, taken, shown):
+            marks.remove_stops(model, tendon)
+    for actuator in _muscles_without_stops(model):
+        disabled = tuple(model.actuator_forcerange[actuator]) == marks.DISABLED_RANGE
+        if marks.has_curves(model, actuator) and model.actuator_forcelimited[actuator] and disabled:
+            marks.remove_curves(model, actuator)
+            model.actuator_forcerange[actuator] = 0.0
+
+
+def restore_tendons(model: mujoco.MjModel) -> None:
+    """Give tendons their stops back, and their actuators the curves; disabled actuators stay disabled."""
+    for actuator in _muscles_without_stops(model):
+        if marks.lacks_curves(model, actuator):
+            marks.restore_curves(model, actuator)
+    for tendon in range(model.ntendon):
+        if marks.lacks_stops(model, tendon):
+            marks.restore_stops(model, tendon)
+
+
+def _muscles_without_stops(model: mujoco.MjModel) -> list[int]:
+    """Return the actuators with muscle dynamics on tendons without stops."""
+    return [
+        actuator
+        for actuator in np.flatnonzero(model.actuator_trntype == _PULLS).tolist()
+        if marks.lacks_stops(model, int(model.actuator_trnid[actuator, 0]))
+        and model.actuator_dyntype[actuator] == _MUSCLE_DYNAMICS
+    ]
+
+
+def hide_tendons(spec: mujoco.MjSpec, muscles: list[MuscleDeclaration]) -> None:
+    """Make the tendons of these muscles invisible; a width set again later is shown, and drawn by the plugin too."""
+    taken = {muscle.tendon for muscle in muscles}
+    for tendon in spec.tendons:
+        if tendon.id in taken:
+            marks.hide_tendon(tendon)
+
+
+def show_tendon(spec: mujoco.MjSpec, actuator: str) -> None:
+    """Give the tendon that an actuator pulls the width back that `hide_tendons` has taken from it."""
+    element = spec.actuator(actuator)
+    tendon = spec.tendon(element.target) if element is not None else None
+    if tendon is not None:
+        marks.show_tendon(tendon)
