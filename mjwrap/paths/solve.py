@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.spans import chain
@@ -54,8 +55,7 @@ def solve_path(
     ignore hints and may find a path that winds further than a string would.
     Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
     """
-    if not (np.isfinite(tol) and tol > 0.0):
-        raise GeometryError(f"tol must be finite and positive, not {tol!r}")
+    tol = validation.positive(tol, "tol", GeometryError)
     here, there = point(origin, "origin"), point(insertion, "insertion")
     node, owner = pack(obstacles), owners(obstacles)
     _start(start, node)
