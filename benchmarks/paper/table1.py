@@ -24,6 +24,7 @@ from table1_extras import Fold, TwoRow, fold, two_cylinders
 from table1_runs import Rates, Row, paper_row, production_row, rates
 
 import mjwrap as mw
+from mjwrap.files.atomic import PartFile
 
 COUNTS = """\
 n_f counts every evaluation of the residual over the whole path at one set of unknowns, those of finite differences,
@@ -170,16 +171,14 @@ def _plot(path: Path, rows: dict[int, list[Row]], folds: list[Fold]) -> None:
 
 
 def _replace(path: Path, write: Any) -> None:
-    """Write a file beside `path` and put it in its place, so that nothing half-written is left."""
-    handle, name = tempfile.mkstemp(dir=path.resolve().parent, prefix=path.name)
+    """Write a file, so that nothing half-written is left."""
+    output = PartFile(path, path.suffix.lower())
     try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+        with output.writing():
+            write(output.part)
+        output.publish()
+    finally:
+        output.discard()
 
 
 def _machine() -> dict[str, Any]:
@@ -254,15 +253,13 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if options.json:
             text = json.dumps(_json(rows, found, two, folds), indent=1, ensure_ascii=False, allow_nan=False)
-            _replace(options.json, lambda file: file.write((text + "\n").encode()))
+            _replace(options.json, lambda file: file.write_text(text + "\n", encoding="utf-8"))
             print(f"\nwrote {options.json}")
         if options.plot:
             _plot(options.plot, rows, folds)
             print(f"\nwrote {options.plot}")
     except OSError as reason:
-        print(
-            f"table1.py: cannot write {reason.filename or options.json}: {reason.strerror}", file=sys.stderr
-        )
+        print(f"table1.py: {reason}", file=sys.stderr)
         return 1
     failures = sum(row.failures for case in rows.values() for row in case) + sum(row.failures for row in two)
     failures += sum(f.failures for f in folds) + sum(r.failures for r in found)

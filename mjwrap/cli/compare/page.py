@@ -70,9 +70,7 @@ def write_page(
         left_out=found.left_out,
         counted=counted,
     )
-    with output.writing():
-        output.part.write_text(page, encoding="utf-8")
-    output.publish()
+    output.write_text(page)
 
 
 def _template() -> jinja2.Template:
