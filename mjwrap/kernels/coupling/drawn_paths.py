@@ -52,7 +52,7 @@ def route_contacts(c, routes, node, seg, seg_count, out, count):
 
 @jit
 def _begin(muscle, last, count, starts):
-    """Write `count`, the rows so far, as where the muscles after `muscle` up to `last` begin; return the last one begun."""
+    """Write that the muscles after `muscle` up to `last` begin at row `count` to starts; return the last one."""
     while muscle < last:
         muscle += 1
         starts[muscle] = count
