@@ -91,7 +91,7 @@ def test_every_public_name_is_listed_and_exists() -> None:
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="has no attribute .Cilinder.; it has: .*Cylinder.*write_table"):
+    with pytest.raises(AttributeError, match=r"has no attribute .Cilinder.; it has: .*Cylinder.*write_table"):
         _ = mw.Cilinder  # pyright: ignore[reportAttributeAccessIssue]
 
 
