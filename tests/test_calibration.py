@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from cli_runs import ELBOW, run_here
+from myo_models import load_myo
 from scipy.optimize import differential_evolution
 
 import mjwrap as mw
@@ -354,9 +355,7 @@ def test_an_elastic_tendon_is_judged_as_a_rigid_one(
 @pytest.mark.slow
 def test_the_full_body_has_160_negative_tendons() -> None:
     """Counted from the model's own arrays, the 44 muscles that stay with MuJoCo included."""
-    myo_sim = pytest.importorskip("myo_sim")
-    with pytest.warns(UserWarning, match="empty prefix"):
-        model = myo_sim.load_model("myofullbody")
+    model = load_myo("myofullbody")
     low, high = model.actuator_lengthrange.T
     first, last = model.actuator_gainprm[:, :2].T
     negative = np.flatnonzero(low - first * (high - low) / (last - first) < 0.0)
@@ -370,9 +369,7 @@ def test_the_full_body_has_160_negative_tendons() -> None:
 @pytest.mark.slow
 def test_random_poses_of_the_arm_stay_within_its_ranges() -> None:
     """Up to eight variables move a muscle: thousands of poses drawn at random get less far than the search."""
-    myo_sim = pytest.importorskip("myo_sim")
-    with pytest.warns(UserWarning, match="empty prefix"):
-        model = myo_sim.load_model("myoarm_r")
+    model = load_myo("myoarm_r")
     muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
     found = mw.length_ranges(muscles)
     assert mw.length_ranges(muscles, names=["BRA"])["BRA"].held == ()

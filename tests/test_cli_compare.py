@@ -48,7 +48,7 @@ def test_a_comparison_in_text_json_csv_and_a_picture(
 
 
 def test_a_report_is_one_page_that_loads_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    model = tmp_path / "ball & <socket>.xml"
+    model = tmp_path / 'ball & <socket> "1".xml'
     model.write_text(BALL.format(side='sidesite="side"'))
     report, facts = tmp_path / "r.html", tmp_path / "j.json"
     ran = compare(capsys, model, "--samples", 101, "--duration", 0.02, "--report", report, "--json", facts)
@@ -63,7 +63,7 @@ def test_a_report_is_one_page_that_loads_nothing(tmp_path: Path, capsys: pytest.
     assert reader.tags.count("svg") >= 2  # a sweep and the motion
     for jump in figures["jumps"]:
         assert f"{jump['sweep']} = {jump['at']:.6f}" in reader.text
-    assert "ball & <socket>.xml" in reader.text
+    assert 'ball & <socket> "1".xml' in reader.text
 
 
 class PageReader(HTMLParser):

@@ -46,7 +46,7 @@ def snapshot(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 
 
 def naive_forces(activation: float, length: float, fiber: float, speed: float) -> tuple[float, float]:
-    """Return tendon force and fibre force along the tendon [N]: muscle.md section 1, written out once more."""
+    """Return tendon force and fibre force along the tendon [N]: the law of docs/derivation.md once more."""
     strong, optimal, slack = (
         ELASTIC[k] for k in ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
     )

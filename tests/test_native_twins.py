@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from declared_models import ARM, EXTENSOR, MUSCLE, tendon_jacobian
 from mjcf_reading import Vector
+from myo_models import load_myo
 from native_twins import EXPLICIT
 
 import mjwrap as mw
@@ -162,9 +163,7 @@ def test_the_plugin_moves_the_model_as_mujoco_does(
 @pytest.mark.slow
 def test_the_arm_of_myo_sim_is_taken_over() -> None:
     """All muscles but one, whose end is inside its cylinder at most poses; held ones agree with MuJoCo's."""
-    myo_sim = pytest.importorskip("myo_sim")
-    with pytest.warns(UserWarning, match="empty prefix"):
-        model, native = (myo_sim.load_model("myoarm_r") for _ in range(2))
+    model, native = (load_myo("myoarm_r") for _ in range(2))
     data, twin, muscles = mujoco.MjData(model), mujoco.MjData(native), mw.MuscleSystem(model)
     assert list(muscles.native) == ["RI2"]
     held = [

@@ -91,7 +91,7 @@ def test_every_public_name_is_listed_and_exists() -> None:
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="Cilinder"):
+    with pytest.raises(AttributeError, match=r"has no attribute .Cilinder.; it has: .*Cylinder.*write_table"):
         _ = mw.Cilinder  # pyright: ignore[reportAttributeAccessIssue]
 
 
@@ -169,7 +169,7 @@ def test_the_package_is_typed() -> None:
     bare = [
         f"{file.name}:{node.lineno} {node.name}"
         for file in sorted(PACKAGE.rglob("*.py"))
-        if not {"kernels", "callbacks"} & set(file.parts)
+        if not {"kernels", "callbacks", "templates"} & set(file.parts)
         for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not is_typed(node)
     ]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -196,28 +194,3 @@ def test_a_jump_is_found_where_the_path_goes_on(
     checks.no_jumps(checks.follow(motion, tau), jumping)
     assert [fault["what"] for fault in jumping.faults] == ["jumps", "jumps"]
     assert np.sin([fault["tau"] for fault in jumping.faults]) * 0.02 == pytest.approx([0.0123] * 2, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("script", "arguments", "message"),
-    [
-        ("robustness/robustness.py", ["--scenes", "0"], "--scenes must be at least 1"),
-        ("robustness/robustness.py", ["--json", "no/such/x.json"], "there is no folder"),
-        ("robustness/robustness.py", ["--replay", "no/such.json"], "--replay takes the file"),
-        ("robustness/robustness.py", ["--classes", "square"], "invalid choice"),
-        ("robustness/motion.py", ["--poses", "5"], "--poses must be at least 101"),
-        ("robustness/motion.py", ["--save", "no/such/x.json"], "there is no folder"),
-    ],
-)
-def test_bad_arguments_are_refused(script: str, arguments: list[str], message: str) -> None:
-    done = subprocess.run(
-        [sys.executable, str(BENCHMARKS / script), *arguments],
-        cwd=BENCHMARKS.parent,
-        env={"PYTHONPATH": str(BENCHMARKS.parent), "PATH": ""},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr

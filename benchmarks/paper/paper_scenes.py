@@ -78,13 +78,6 @@ def two_centres(t: float) -> Array:
     return np.array([[0.0, first, 0.0], [-0.5, second, 0.0]]) * CM
 
 
-def two_centre_velocities(t: float) -> Array:
-    """Return both centres' velocities (2, 3) [m/s] at time t [s]."""
-    first = 0.15 * 2.0 * math.pi * math.cos(2.0 * math.pi * t)
-    second = -0.15 * 2.0 * math.pi * math.sin(2.0 * math.pi * (t + 0.24))
-    return np.array([[0.0, first, 0.0], [0.0, second, 0.0]]) * CM
-
-
 def closed_form(case: int, t: float) -> tuple[float, bool]:
     """Return the exact length [m] and whether the path touches the cylinder, over which it runs on +y.
 

@@ -24,6 +24,8 @@ from table1_extras import Fold, TwoRow, fold, two_cylinders
 from table1_runs import Rates, Row, paper_row, production_row, rates
 
 import mjwrap as mw
+from mjwrap.files.atomic import PartFile
+from mjwrap.text import aligned
 
 COUNTS = """\
 n_f counts every evaluation of the residual over the whole path at one set of unknowns, those of finite differences,
@@ -72,16 +74,14 @@ def _plot_file(text: str) -> Path:
 def _print_rows(case: int, rows: list[Row]) -> None:
     amplitude = paper.AMPLITUDE[case] / paper.CM
     print(f"\nCase {case}: c_y = {amplitude:g} sin 2πt cm, 251 poses, {rows[-1].touched} of them touched")
-    print(
-        f"{'':16}{'n_i':>7}{'paper':>8}{'i_a':>6}{'paper':>6}{'n_f':>9}{'paper':>9}{'time [s]':>11}{'paper':>8}"
-        f"{'failed':>8}{'max ‖f‖':>10}{'length error [cm]':>19}"
-    )
+    heads = ("", "n_i", "paper", "i_a", "paper", "n_f", "paper", "time [s]", "paper", "failed", "max ‖f‖")
+    table = [[*heads, "length error [cm]"]]
     for row in rows:
         n_i, i_a, n_f, seconds = (f"{x:,}" for x in row.paper) if row.paper else ("–",) * 4
-        print(
-            f"{row.label:16}{row.n_i:>7,}{n_i:>8}{row.i_a:>6.1f}{i_a:>6}{row.n_f:>9,}{n_f:>9}{row.seconds:>11.3g}"
-            f"{seconds:>8}{row.failures:>8}{row.tangency_error:>10.1e}{row.length_error_cm:>19.1e}"
-        )
+        counts = [f"{row.n_i:,}", n_i, f"{row.i_a:.1f}", i_a, f"{row.n_f:,}", n_f]
+        errors = [f"{row.failures}", f"{row.tangency_error:.1e}", f"{row.length_error_cm:.1e}"]
+        table.append([row.label, *counts, f"{row.seconds:.3g}", seconds, *errors])
+    print("\n".join(aligned(table)))
 
 
 def _print_rates(found: list[Rates]) -> None:
@@ -109,15 +109,20 @@ def _print_rates(found: list[Rates]) -> None:
 def _print_two(rows: list[TwoRow]) -> None:
     n_i, i_a, n_f, seconds = paper.TWO_PAPER
     print(f"\nTwo cylinders: {paper.TWO_WHY}")
-    print(
-        f"{'':16}{'n_i':>7}{'i_a':>6}{'n_f':>9}{'time [s]':>11}{'failed':>8}{'max ‖f‖':>10}{'against newton':>17}"
-    )
+    table = [["", "n_i", "i_a", "n_f", "time [s]", "failed", "max ‖f‖", "against newton"]]
     for row in rows:
-        print(
-            f"{row.label:16}{row.n_i:>7,}{row.n_i / 251:>6.1f}{row.n_f:>9,}{row.seconds:>11.3g}{row.failures:>8}"
-            f"{row.tangency_error:>10.1e}{row.length_difference:>17.1e}"
-        )
-    print(f"{'paper, BR':16}{n_i:>7,}{i_a:>6}{n_f:>9,}{seconds:>11}   (its own radii and end points)")
+        counts = [
+            f"{row.n_i:,}",
+            f"{row.n_i / 251:.1f}",
+            f"{row.n_f:,}",
+            f"{row.seconds:.3g}",
+            f"{row.failures}",
+        ]
+        table.append([row.label, *counts, f"{row.tangency_error:.1e}", f"{row.length_difference:.1e}"])
+    table.append(
+        ["paper, BR", f"{n_i:,}", f"{i_a}", f"{n_f:,}", f"{seconds}", "", "", "own radii, end points"]
+    )
+    print("\n".join(aligned(table)))
     patterns = {tuple(row.touched) for row in rows}
     touched = " or ".join(f"{first} and {second}" for first, second in sorted(patterns))
     print(f"touched: the first and the second cylinder at {touched} poses, over all methods")
@@ -170,16 +175,14 @@ def _plot(path: Path, rows: dict[int, list[Row]], folds: list[Fold]) -> None:
 
 
 def _replace(path: Path, write: Any) -> None:
-    """Write a file beside `path` and put it in its place, so that nothing half-written is left."""
-    handle, name = tempfile.mkstemp(dir=path.resolve().parent, prefix=path.name)
+    """Write a file, so that nothing half-written is left."""
+    output = PartFile(path, path.suffix.lower())
     try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+        with output.writing():
+            write(output.part)
+        output.publish()
+    finally:
+        output.discard()
 
 
 def _machine() -> dict[str, Any]:
@@ -254,15 +257,13 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         if options.json:
             text = json.dumps(_json(rows, found, two, folds), indent=1, ensure_ascii=False, allow_nan=False)
-            _replace(options.json, lambda file: file.write((text + "\n").encode()))
+            _replace(options.json, lambda file: file.write_text(text + "\n", encoding="utf-8"))
             print(f"\nwrote {options.json}")
         if options.plot:
             _plot(options.plot, rows, folds)
             print(f"\nwrote {options.plot}")
     except OSError as reason:
-        print(
-            f"table1.py: cannot write {reason.filename or options.json}: {reason.strerror}", file=sys.stderr
-        )
+        print(f"table1.py: {reason}", file=sys.stderr)
         return 1
     failures = sum(row.failures for case in rows.values() for row in case) + sum(row.failures for row in two)
     failures += sum(f.failures for f in folds) + sum(r.failures for r in found)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import paper_scenes as paper
 from paper_scenes import Array
-from table1_runs import TOL, case_problem, lengthening_rate
+from table1_runs import TOL, case_problem, lengthening_rate, timed_sweep
 
 import mjwrap as mw
 from mjwrap.methods import iterate, make_solver, solve_chain
@@ -42,22 +42,15 @@ class TwoRow:
 def two_cylinders(repeats: int) -> tuple[list[TwoRow], Array]:
     """Run every method and the production solver; return their rows and the production lengths (251,) [m]."""
     pos = np.array([paper.two_centres(t) for t in paper.TIMES])
-    quat = np.zeros((len(pos), 2, 4))
-    quat[..., 0] = 1.0
     over, under = (0.0, paper.TWO_RADIUS, -0.015), (0.0, -paper.TWO_RADIUS, -0.0125)
     obstacles = [mw.Obstacle(SURFACES[0], hint=over), mw.Obstacle(SURFACES[1], hint=under)]
-    sweep = mw.solve_sweep(paper.ORIGIN, paper.INSERTION, obstacles, pos, quat, warm=True)
-    taken = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        sweep = mw.solve_sweep(paper.ORIGIN, paper.INSERTION, obstacles, pos, quat, warm=True)
-        taken.append(time.perf_counter() - began)
+    sweep, seconds = timed_sweep(obstacles, pos, repeats)
     rows = [_two_row(label, method, options, pos, sweep.length) for label, method, options in TWO_ROWS]
     newton = TwoRow(
         "mjwrap newton",
         int(sweep.iterations.sum()),
         int(sweep.evaluations.sum()),
-        float(np.median(taken)),
+        seconds,
         int((sweep.status != mw.Status.CONVERGED).sum()),
         _newton_touched(obstacles, pos),
         float(sweep.tangency_error.max()),

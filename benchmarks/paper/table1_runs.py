@@ -89,11 +89,9 @@ def paper_row(case: int, row: paper.PaperRow, restart: bool) -> Row:
     )
 
 
-def production_row(case: int, repeats: int) -> Row:
-    """Run `mjwrap.solve_sweep`, one compiled call for the 251 poses; seconds: median over repeats, once compiled."""
-    obstacles = [mw.Obstacle(CYLINDER, hint=HINT)]
-    pos = np.array([[paper.centre(case, t)] for t in paper.TIMES])
-    quat = np.zeros((len(pos), 1, 4))
+def timed_sweep(obstacles: list[mw.Obstacle], pos: Array, repeats: int) -> tuple[mw.SweepSolution, float]:
+    """Return `mjwrap.solve_sweep` of the poses (251, n, 3) [m] and its time [s]: median over repeats, once compiled."""
+    quat = np.zeros((*pos.shape[:2], 4))
     quat[..., 0] = 1.0
     sweep = mw.solve_sweep(paper.ORIGIN, paper.INSERTION, obstacles, pos, quat, warm=True)
     taken = []
@@ -101,13 +99,21 @@ def production_row(case: int, repeats: int) -> Row:
         began = time.perf_counter()
         sweep = mw.solve_sweep(paper.ORIGIN, paper.INSERTION, obstacles, pos, quat, warm=True)
         taken.append(time.perf_counter() - began)
+    return sweep, float(np.median(taken))
+
+
+def production_row(case: int, repeats: int) -> Row:
+    """Run `mjwrap.solve_sweep`, one compiled call for the 251 poses; seconds: median over repeats, once compiled."""
+    obstacles = [mw.Obstacle(CYLINDER, hint=HINT)]
+    pos = np.array([[paper.centre(case, t)] for t in paper.TIMES])
+    sweep, seconds = timed_sweep(obstacles, pos, repeats)
     exact = [paper.closed_form(case, t) for t in paper.TIMES]
     return Row(
         case,
         "mjwrap newton",
         int(sweep.iterations.sum()),
         int(sweep.evaluations.sum()),
-        float(np.median(taken)),
+        seconds,
         int((sweep.status != mw.Status.CONVERGED).sum()),
         sum(touches for _, touches in exact),
         float(sweep.tangency_error.max()),

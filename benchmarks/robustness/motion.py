@@ -3,7 +3,7 @@
 Each motion moves and turns all surfaces and both end points through one period in 1,501 poses, each solved from
 the one before. It fails where length or moment arm jumps though the path goes on behind the jump (polished
 there by other means, and judged), where the speed is not the rate of the length, where it depends on the way
-(backwards, every 10th or 50th pose, one compiled loop) and where the judge of `tests/certificate.py` refutes a
+(backwards, every 10th or 50th pose, one compiled loop) and where the judge of `certificate.py` refutes a
 pose. A string that slips because its path ceases to be a minimum is counted apart. Surfaces pulled through a
 string in one or two steps are compared with the same in fine ones. The exit status is 1 for any failure.
 """
@@ -38,11 +38,12 @@ from motion_checks import (
     touched,
 )
 from motions import Motion, random_motion
+from options import add_options, parsed
 from tqdm import tqdm
 
 import mjwrap as mw
 from mjwrap.verification.cases import describe
-from mjwrap.verification.random_scenes import CLASSES, Maker
+from mjwrap.verification.random_scenes import Maker
 from mjwrap.verification.scenes import height
 
 POSES = 1501
@@ -209,25 +210,8 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--motions", type=int, default=10, help="motions of each class (default 10)")
     parser.add_argument("--poses", type=int, default=POSES, help=f"of each motion (default {POSES:,})")
-    parser.add_argument("--classes", nargs="+", choices=CLASSES, default=list(CLASSES), metavar="CLASS")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
-    parser.add_argument("--save", type=Path, help="write every motion with a failure to this JSON file")
-    parser.add_argument(
-        "--replay", nargs="+", metavar=("FILE", "INDEX"), help="run saved motions again, all or one"
-    )
-    options = parser.parse_args()
-    for name, least in (("motions", 1), ("poses", 101), ("jobs", 1), ("seed", 0)):
-        if getattr(options, name) < least:
-            parser.error(f"--{name} must be at least {least}")
-    for file in (options.json, options.save):
-        if file is not None and not file.parent.is_dir():
-            parser.error(f"there is no folder {file.parent}")
-    if options.replay and (len(options.replay) > 2 or not Path(options.replay[0]).is_file()):
-        parser.error("--replay takes the file of an earlier --save, and perhaps the number of one motion")
-    return options
+    add_options(parser, "every motion with a failure", "run saved motions again")
+    return parsed(parser, motions=1, poses=101)
 
 
 def main() -> int:

@@ -2,7 +2,7 @@
 
 Scenes at muscle scale of every surface alone and of rows of 3, 5, 16 and 64 (`random_scenes.py`), each solved
 with good hints, with random ones and with none. Every converged answer is judged again, from its contact points
-alone, by `tests/certificate.py`. Answers without hints are compared with every other path known for the scene:
+alone, by `certificate.py`. Answers without hints are compared with every other path known for the scene:
 the one that it was made for, the certified answers with hints, and, for the first --multistart scenes of a
 class, the shortest that an independent search finds (`multistart.py`). Whatever does not converge, is refuted
 or is longer can be saved and replayed. The exit status is 1 if a claim is refuted.
@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from options import add_options, parsed
 from robustness_table import NOTES, PEERS, REFUSALS, Tally, table
 from tqdm import tqdm
 
@@ -190,9 +191,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--scenes", type=int, default=200, help="scenes of each class and kind of hints (default 200)"
     )
-    parser.add_argument("--classes", nargs="+", choices=CLASSES, default=list(CLASSES), metavar="CLASS")
     parser.add_argument("--hints", nargs="+", choices=HINTS, default=list(HINTS))
-    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--multistart",
         type=int,
@@ -200,23 +199,8 @@ def arguments() -> argparse.Namespace:
         metavar="N",
         help="scenes of each class searched anew (default 20)",
     )
-    parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
-    parser.add_argument("--save", type=Path, help="write every case that did not hold to this JSON file")
-    parser.add_argument(
-        "--replay", nargs="+", metavar=("FILE", "INDEX"), help="solve saved cases again, all or one"
-    )
-    options = parser.parse_args()
-    for name, least in (("scenes", 1), ("multistart", 0), ("jobs", 1), ("seed", 0)):
-        if getattr(options, name) < least:
-            parser.error(f"--{name} must be at least {least}")
-    for file in (options.json, options.save):
-        if file is not None and not file.parent.is_dir():
-            parser.error(f"there is no folder {file.parent}")
-    if options.replay and (len(options.replay) > 2 or not Path(options.replay[0]).is_file()):
-        parser.error("--replay takes the file of an earlier --save, and perhaps the number of one case")
-    return options
+    add_options(parser, "every case that did not hold", "solve saved cases again")
+    return parsed(parser, scenes=1, multistart=0)
 
 
 def jobs_of(options: argparse.Namespace) -> list[tuple]:

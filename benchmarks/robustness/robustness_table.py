@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from mjwrap.text import aligned
+
 REFUSALS = ("OUT_OF_RANGE", "NO_GEODESIC")  # no path of that kind exists, says the solver
 PEERS = """\
 CableSpan (C++, measured on the same machine): of cold starts on mixed scenes 8 to 10 % do not converge, and nothing
@@ -74,20 +76,21 @@ class Tally:
 
 
 COLUMNS = (
-    ("class", "<17"),
-    ("hints", "<6"),
-    ("scenes", ">6"),
-    ("not converged", ">13"),
-    ("no path exists", ">14"),
-    ("refuted", ">7"),
-    ("folded", ">6"),
-    ("penetrating", ">11"),
-    ("raised", ">6"),
-    ("NaN", ">3"),
-    ("longer", ">14"),
-    ("evaluations", ">11"),
-    ("µs", ">13"),
+    "class",
+    "hints",
+    "scenes",
+    "not converged",
+    "no path exists",
+    "refuted",
+    "folded",
+    "penetrating",
+    "raised",
+    "NaN",
+    "longer",
+    "evaluations",
+    "µs",
 )
+WORDS = (0, 1)  # columns that hold no numbers
 
 
 def row_of(name: str, hints: str, numbers: dict[str, Any]) -> list[str]:
@@ -114,15 +117,10 @@ def row_of(name: str, hints: str, numbers: dict[str, Any]) -> list[str]:
 def table(results: dict[str, dict[str, dict]], markdown: bool) -> str:
     """Return the table of all classes as text, or as Markdown."""
     rows = [row_of(name, kind, numbers) for name, kinds in results.items() for kind, numbers in kinds.items()]
-    names = [name for name, _ in COLUMNS]
     if markdown:
-        rule = ["---" if width[0] == "<" else "---:" for _, width in COLUMNS]
-        return "\n".join("| " + " | ".join(cells) + " |" for cells in (names, rule, *rows))
-    lines = [
-        " ".join(f"{cell:{width}}" for cell, (_, width) in zip(cells, COLUMNS, strict=True))
-        for cells in (names, *rows)
-    ]
-    return "\n".join(line.rstrip() for line in lines)
+        rule = ["---" if i in WORDS else "---:" for i in range(len(COLUMNS))]
+        return "\n".join("| " + " | ".join(cells) + " |" for cells in (COLUMNS, rule, *rows))
+    return "\n".join(aligned([COLUMNS, *rows], WORDS))
 
 
 NOTES = """\

@@ -12,6 +12,7 @@ from typing import Any
 from path_targets import Rows
 
 import mjwrap as mw
+from mjwrap.text import aligned
 
 
 def machine() -> dict[str, str]:
@@ -29,36 +30,33 @@ def machine() -> dict[str, str]:
 def print_scene(name: str, rows: Rows, missing: dict[str, str]) -> None:
     """Print one scene's table."""
     print(f"\n{name}")
-    print(
-        f"  {'':16}{'median':>10}{'p95':>10}{'whole':>10}{'times mjwrap (range)':>25}{'failures':>16}{'length':>8}"
-        f"{'steps':>7}"
-    )
+    table = [["", "median", "p95", "whole", "times mjwrap (range)", "failures", "length", "steps", ""]]
     for solver, row in rows.items():
+        times = [f"{row[name]:.3f}" for name in ("median", "p95", "whole")]
         ratio = f"{row['ratio']:.3g} ({row['ratio_low']:.3g} to {row['ratio_high']:.3g})"
         failures = f"{row['failures']} of {row['poses']}"
-        steps = f"{row['iterations']:7.2f}" if "iterations" in row else ""
-        shorter = f"  shorter at {row['shorter']}" if row["shorter"] else ""
-        print(
-            f"  {solver:16}{row['median']:10.3f}{row['p95']:10.3f}{row['whole']:10.3f}{ratio:>25}{failures:>16}"
-            f"{row['length_difference']:8.0e}{steps}{shorter}"
-        )
+        steps = f"{row['iterations']:.2f}" if "iterations" in row else ""
+        shorter = f"shorter at {row['shorter']}" if row["shorter"] else ""
+        table.append([solver, *times, ratio, failures, f"{row['length_difference']:.0e}", steps, shorter])
+    for line in aligned(table, (0, 8)):
+        print(f"  {line}")
     for solver, reason in missing.items():
-        print(f"  {solver:16}  no: {reason}")
+        print(f"  {solver}: no: {reason}")
 
 
 def compare(old: dict[str, Any], new: dict[str, Any]) -> None:
     """Print the medians of two saved runs side by side."""
     changed = {k: (old["machine"].get(k), v) for k, v in new["machine"].items() if old["machine"].get(k) != v}
     print("\nagainst the old run" + (f" (other: {changed})" if changed else ""))
-    print(f"  {'':16}{'':20}{'old':>9}{'new':>9}{'new/old':>9}")
+    table = [["", "", "old", "new", "new/old"]]
     for scene, rows in new["scenes"].items():
         for solver, row in rows.items():
             before = old["scenes"].get(scene, {}).get(solver)
             if before is not None:
-                print(
-                    f"  {scene:16}{solver:20}{before['median']:9.3f}{row['median']:9.3f}"
-                    f"{row['median'] / before['median']:9.2f}"
-                )
+                ratio = f"{row['median'] / before['median']:.2f}"
+                table.append([scene, solver, f"{before['median']:.3f}", f"{row['median']:.3f}", ratio])
+    for line in aligned(table, (0, 1)):
+        print(f"  {line}")
 
 
 def read_old(path: Path) -> dict[str, Any]:

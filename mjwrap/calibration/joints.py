@@ -120,9 +120,7 @@ class JointSpace:
 
     def moves(self, muscles: list[MuscleDeclaration]) -> tuple[Bools, list[tuple[str, ...]]]:
         """Return which variables move which muscle (n, k), and the names of the held joints that do."""
-        joints = crossed_dofs(self.model, muscles)[
-            :, self.model.jnt_dofadr
-        ]  # all dofs of a joint move the same bodies
+        joints = crossed_dofs(self.model, muscles)[:, self.model.jnt_dofadr]
         variables = np.zeros((len(muscles), self.k), dtype=np.bool_)
         held: list[tuple[str, ...]] = []
         for i, row in enumerate(joints):

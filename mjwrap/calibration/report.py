@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from mjwrap.calibration.ranges import LengthRange
+from mjwrap.text import aligned
 
 
 class Implausible(enum.StrEnum):
@@ -70,8 +71,7 @@ class ParameterReport:
 
     def table(self) -> str:
         """Return a line per finding, then how many there are of each kind, then the remarks."""
-        width = max((len(finding.muscle) for finding in self.findings), default=0)
-        lines = [f"{f.muscle:{width}s}  {f.kind:16s}  {f.sentence}" for f in self.findings]
+        lines = aligned([(f.muscle, f.kind, f.sentence) for f in self.findings], (0, 1, 2))
         counts = Counter(finding.kind for finding in self.findings)
         muscles = len({finding.muscle for finding in self.findings})
         kinds = ", ".join(f"{kind} {counts[kind]}" for kind in Implausible if counts[kind])

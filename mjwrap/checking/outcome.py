@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.text import counted
+from mjwrap.text import aligned, counted
 
 Array = NDArray[np.float64]
 
@@ -70,8 +70,7 @@ class Checks:
 
     def table(self) -> str:
         """Return a line for each check, and its remarks below it."""
-        wide = max(len(check.what) for check in self.checks)
-        lines = []
+        rows = []
         for check in self.checks:
             unit = f" {check.unit}" if check.unit else ""
             if check.verdict == "skip":
@@ -81,8 +80,10 @@ class Checks:
             else:
                 told = f"{check.worst:.1e}{unit}, limit {check.limit:.0e}"
                 told += f"  ({check.where})" if check.where else ""
-            lines.append(f"{check.verdict}  {check.what:{wide}s}  {told}")
-            lines += [f"      {remark}" for remark in check.remarks]
+            rows.append((check.verdict, check.what, told))
+        lines = []
+        for line, check in zip(aligned(rows, (0, 1, 2)), self.checks, strict=True):
+            lines += [line, *(f"      {remark}" for remark in check.remarks)]
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:

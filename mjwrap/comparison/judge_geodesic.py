@@ -89,11 +89,6 @@ def _radial(v: Array, cylinder: bool) -> Array:
     return v * np.array([1.0, 1.0, 0.0]) if cylinder else v
 
 
-def clearance(a: Array, b: Array, cylinder: bool) -> Array:
-    """Return the least distance (T,) of the straight segments ab from the axis or centre [m]."""
-    return _norm(nearest(a, b, cylinder))
-
-
 def nearest(a: Array, b: Array, cylinder: bool) -> Array:
     """Return the vectors (T, 3) from the axis or centre to the nearest points of the straight segments ab [m]."""
     start, step = _radial(a, cylinder), _radial(b - a, cylinder)

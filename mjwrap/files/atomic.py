@@ -72,6 +72,12 @@ class PartFile:
         self._text = self.part.open("w", encoding="utf-8", newline="")
         return self._text
 
+    def write_text(self, text: str) -> None:
+        """Write the whole file and give it its name."""
+        with self.writing():
+            self.part.write_text(text, encoding="utf-8")
+        self.publish()
+
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
         """Turn what the disk refuses inside a with block into a RecordingError."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import uuid
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
-from mjwrap.errors import TableError
+from mjwrap.errors import RecordingError, TableError
+from mjwrap.files.atomic import PartFile
 from mjwrap.files.table import SUFFIXES, Array, Table, check_names
 
 _DIGITS = 12  # room for the number of rows, which is known at the end
@@ -23,25 +22,24 @@ def write_table(path: str | os.PathLike[str], table: Table) -> None:
     Numbers are written in full precision. CSV has no place for metadata. `TableError` where that place cannot be
     written, or a name cannot stand in such a file.
     """
-    file = Path(path)
-    if file.suffix.lower() not in SUFFIXES:
-        raise TableError(f"'{file}': the name of a table must end in {', '.join(SUFFIXES)}")
-    part = file.with_name(f".{file.stem}.{uuid.uuid4().hex[:8]}.part{file.suffix}")
+    output: PartFile | None = None
     try:
-        if file.suffix.lower() == ".npz":
-            save_npz(part, table)
-        else:
-            with part.open("w", encoding="utf-8", newline="") as out:
-                writer = RowWriter(out, file.suffix, table.names, table.metadata)
+        output = PartFile(path, *SUFFIXES)
+        suffix = output.path.suffix.lower()
+        with output.writing():
+            if suffix == ".npz":
+                save_npz(output.part, table)
+            else:
+                writer = RowWriter(output.open_text(), suffix, table.names, table.metadata)
                 for time, row in zip(table.time.tolist(), table.values.tolist(), strict=True):
                     writer.add(time, row)
                 writer.finish()
-        os.replace(part, file)
-    except OSError as error:
-        raise TableError(f"cannot write '{file}': {(error.strerror or str(error)).lower()}") from None
+        output.publish()
+    except RecordingError as error:
+        raise TableError(str(error)) from None
     finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
+        if output is not None:
+            output.discard()
 
 
 def save_npz(path: Path, table: Table) -> None:

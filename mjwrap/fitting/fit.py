@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass, fields
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.fitting import shapes
 from mjwrap.fitting.least_squares import LOST, growth, solve
@@ -167,8 +167,8 @@ def _checked(shape: Shape, points: ArrayLike, scale: float | None) -> Array:
         )
     if len(x) < shape.unknowns:
         raise GeometryError(f"fit of {shape.name}: it needs at least {shape.unknowns} points, not {len(x)}")
-    if scale is not None and not (math.isfinite(scale) and scale > 0.0):
-        raise GeometryError(f"fit of {shape.name}: scale must be finite and positive [m], not {scale!r}")
+    if scale is not None:
+        validation.positive(scale, f"fit of {shape.name}: scale", GeometryError, "m")
     return x
 
 

@@ -48,9 +48,7 @@ S_SWEEP = 23  # angle swept about a cylinder's axis from the node before to the 
 S_P = 24  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts, see `jumps.py`
 S_T = 27  # unit tangent at P in S (3); FREE, no closed form: where the straight segment ends [m]; zeros: not known
 S_ARC = 30  # arc length s [m]
-S_BEFORE = (
-    31  # lengths of the straight segments that meet P and leave Q, where the path was found last (2) [m]
-)
+S_BEFORE = 31  # lengths of the straight segments to P and from Q, where the path was found last (2) [m]
 STATE = 11  # how many they are
 
 COLD = -1.0
@@ -84,9 +82,7 @@ W_RMIN = 112  # smallest of r over the arc so far: <= 0 behind a conjugate point
 W_ANGLE = 113  # about the axis from P to Q [rad]; torus: how often the hole is passed; CUSTOM: 1 out of range, else 0
 TWIN = 114  # 1 in the second row of a surface that a string may touch twice, 0 else
 W_LAST = 115  # the saved solution before a single wrap (11)
-W_FRESH = (
-    126  # ||f||^2 of a single wrap just found, whose evaluation the row still holds; -1 where there is none
-)
+W_FRESH = 126  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
 W_BEST = 127  # the shortest solution that several cold starts have found (11)
 W_START = 138  # the saved solution from which a solve over a large move started (11)
 W_LOW = 149  # height of the lowest point of a free string over the surface [m]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.kernels.musculotendon import activation_dynamics
 
@@ -38,8 +38,8 @@ class ActivationDynamics:
             "smoothing": self.smoothing,
         }
         for name, value in values.items():
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ModelError(f"{name} must be finite and positive, not {value!r}")
+            if value is not None:
+                validation.positive(value, name, ModelError)
 
     @property
     def form(self) -> int:

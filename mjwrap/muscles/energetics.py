@@ -5,13 +5,13 @@ The equations are in `mjwrap/kernels/musculotendon/power.py` and `mjwrap/kernels
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.kernels.musculotendon import power as kernel
 from mjwrap.kernels.musculotendon import tension, umberger
@@ -60,12 +60,10 @@ class Umberger2010:
             )
         for name in ("specific_tension", "density", "mass"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise ModelError(f"Umberger2010: {name} must be finite and positive, not {value!r}")
+            if value is not None:
+                validation.positive(value, f"Umberger2010: {name}", ModelError)
         for name in ("aerobic_factor", "minimum_heat_rate", "effort"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ModelError(f"Umberger2010: {name} must be finite and >= 0, not {value!r}")
+            validation.not_negative(getattr(self, name), f"Umberger2010: {name}", ModelError)
 
     def muscle_mass(self, max_isometric_force: float, optimal_fiber_length: float) -> float:
         """Return the mass of a muscle [kg] of a given force [N] and fibre length [m]."""

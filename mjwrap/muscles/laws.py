@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.kernels.musculotendon import degroote_fregly, millard, tension
 from mjwrap.kernels.musculotendon.mujoco_muscle import MINVAL
@@ -48,7 +49,7 @@ def _require(law: Law, good: bool, name: str, value: float, wanted: str) -> None
 
 def _positive(law: Law, **values: float) -> None:
     for name, value in values.items():
-        _require(law, math.isfinite(value) and value > 0.0, name, value, "finite and positive")
+        validation.positive(value, f"{law.law}: {name}", ModelError)
 
 
 def _check_fiber(law: DeGrooteFregly2016 | Millard2012) -> None:
@@ -60,9 +61,9 @@ def _check_fiber(law: DeGrooteFregly2016 | Millard2012) -> None:
         max_contraction_velocity=law.max_contraction_velocity,
     )
     slack, angle, damping = law.tendon_slack_length, law.pennation_angle, law.damping
-    _require(law, math.isfinite(slack) and slack >= 0.0, "tendon_slack_length", slack, "finite and >= 0 [m]")
+    validation.not_negative(slack, f"{law.law}: tendon_slack_length", ModelError, "m")
     _require(law, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
-    _require(law, math.isfinite(damping) and damping >= 0.0, "fiber_damping", damping, "finite and >= 0")
+    validation.not_negative(damping, f"{law.law}: fiber_damping", ModelError)
     if law.tendon not in TENDONS:
         raise ModelError(f"{law.law}: tendon must be one of {', '.join(TENDONS)}, not {law.tendon!r}")
 
@@ -201,9 +202,9 @@ class MuJoCoMuscle:
             for name, value in zip(_PRM, prm, strict=True):
                 _require(self, math.isfinite(value), what + name, value, "finite")
             _require(self, prm[1] > prm[0], f"{what}range", prm[1], f"above {prm[0]}")
-            _require(self, prm[5] > 0.0, f"{what}lmax", prm[5], "finite and positive")
+            validation.positive(prm[5], f"{self.law}: {what}lmax", ModelError)
         _require(self, math.isfinite(self.acc0), "acc0", self.acc0, "finite")
-        _require(self, math.isfinite(self.gear) and self.gear > 0.0, "gear", self.gear, "finite and positive")
+        _positive(self, gear=self.gear)
         low, high = self.length_range
         _require(
             self, high > low, "length range", low - high, "increasing: optimal fibre length is zero otherwise"

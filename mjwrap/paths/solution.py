@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import polyline, segments
@@ -101,9 +102,7 @@ class PathSolution(Derivatives):
 
         Without a spacing, straight segments have their end points only and geodesics a point every 0.1 rad of turning.
         """
-        if spacing is not None and not (np.isfinite(spacing) and spacing > 0.0):
-            raise GeometryError(f"spacing must be finite and positive [m], not {spacing!r}")
-        step = 0.0 if spacing is None else float(spacing)
+        step = 0.0 if spacing is None else validation.positive(spacing, "spacing", GeometryError, "m")
         count = polyline.polyline(*self._ends, self._node, step, np.empty((0, 3)), 0)
         out = np.empty((count, 3))
         polyline.polyline(*self._ends, self._node, step, out, 0)
@@ -127,7 +126,7 @@ class PathSolution(Derivatives):
         """Return what the path under `tension` [N] does to origin, each obstacle and insertion.
 
         (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
-        is -tension l̇ (method section 5).
+        is -tension l̇ (docs/derivation.md, velocity and force).
         """
         if not np.isfinite(tension):
             raise GeometryError(f"tension must be finite [N], not {tension!r}")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.spans import chain
@@ -49,13 +50,11 @@ def solve_path(
 
     origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
     an earlier solution for the same obstacles elsewhere, or its `branch`: side and winding are kept; tol: largest
-    tangency
-    error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`), which
-    ignore hints and may find a path that winds further than a string would.
+    tangency error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`),
+    which ignore hints and may find a path that winds further than a string would.
     Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
     """
-    if not (np.isfinite(tol) and tol > 0.0):
-        raise GeometryError(f"tol must be finite and positive, not {tol!r}")
+    tol = validation.positive(tol, "tol", GeometryError)
     here, there = point(origin, "origin"), point(insertion, "insertion")
     node, owner = pack(obstacles), owners(obstacles)
     _start(start, node)

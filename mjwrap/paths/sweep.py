@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.spans import chain
@@ -62,8 +63,7 @@ def solve_sweep(
     pos (T, n, 3), quat (T, n, 4) w, x, y, z: their poses. warm: each pose starts from the ones before and keeps their
     branch, else each starts cold. Raises `GeometryError` for arrays of other shapes or not finite.
     """
-    if not (np.isfinite(tol) and tol > 0.0):
-        raise GeometryError(f"tol must be finite and positive, not {tol!r}")
+    tol = validation.positive(tol, "tol", GeometryError)
     n = len(obstacles)
     node, owner = pack(obstacles), owners(obstacles)
     shape = np.shape(pos)

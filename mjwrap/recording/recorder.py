@@ -11,6 +11,7 @@ import numpy as np
 
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
+from mjwrap.validation import is_positive
 
 if TYPE_CHECKING:
     from mjwrap.recording.frames import Buffers
@@ -59,13 +60,13 @@ class Recorder(RunLog):
         flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
-        require("rate", rate, rate is None or _positive(rate), "a positive number of states per second")
-        require("path_rate", path_rate, _positive(path_rate), "a positive number of frames per second")
-        scaled = force_scale is None or _positive(force_scale)
+        require("rate", rate, rate is None or is_positive(rate), "a positive number of states per second")
+        require("path_rate", path_rate, is_positive(path_rate), "a positive number of frames per second")
+        scaled = force_scale is None or is_positive(force_scale)
         require("force_scale", force_scale, scaled, "a positive length per force in metres per newton")
         whole = flush_every is None or (isinstance(flush_every, numbers.Integral) and flush_every >= 1)
         require("flush_every", flush_every, whole, "a whole number, at least 1")
-        require("spacing", spacing, spacing is None or _positive(spacing), "a positive length in metres")
+        require("spacing", spacing, spacing is None or is_positive(spacing), "a positive length in metres")
         if path is None and not connect:
             raise RecordingError("there is nowhere to record to: give a file name, or connect=True, or both")
         target = None if path is None else PartFile(path, SUFFIX)
@@ -145,8 +146,3 @@ def _open(
         stream.abandon()
         raise
     return buffers, stream
-
-
-def _positive(value: object) -> bool:
-    """Whether an option is a finite number above zero."""
-    return isinstance(value, numbers.Real) and 0 < float(value) < math.inf

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import dof_names
-from mjwrap.runs.run_table import spanned
+from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class MuscleAnalysisTables:
         self._parts: list[_Part] = []
         names, dofs = muscles.names, dof_names(model)
         fibers = [i for i, m in enumerate(muscles.declarations) if hasattr(m.parameters, "tendon")]
-        moved = sorted({d for muscle in muscles.declarations for d in spanned(model, muscle)})
+        moved = np.flatnonzero(crossed_dofs(model, muscles.declarations).any(axis=0)).tolist()
         self._add(prefix, "Length", names, lambda _: muscles.length)
         if fibers:
             with_fibers = [names[i] for i in fibers]

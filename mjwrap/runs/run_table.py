@@ -13,7 +13,7 @@ from mjwrap.errors import TableError
 from mjwrap.files import RowWriter, Table
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.writing import save_npz
-from mjwrap.mjcf import MuscleDeclaration, act_names, dof_names, qpos_names
+from mjwrap.mjcf import act_names, dof_names, qpos_names
 from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.runs.excitation import control_names
 from mjwrap.system import MuscleSystem
@@ -59,19 +59,11 @@ def _reader(owner: MuscleSystem | None, kind: str) -> Callable[[mujoco.MjData], 
 
 
 def _moment_arms(model: mujoco.MjModel, muscles: MuscleSystem) -> Column:
-    """Return the moment arms of every muscle about the joints that it spans."""
+    """Return the moment arms of every muscle about the joints that it crosses."""
     dofs = dof_names(model)
-    pairs = [(i, d) for i, muscle in enumerate(muscles.declarations) for d in spanned(model, muscle)]
-    rows, places = (
-        np.array(part, dtype=np.int64) for part in (zip(*pairs, strict=True) if pairs else ((), ()))
-    )
-    names = [f"moment_arm:{muscles.names[i]}:{dofs[d]}" for i, d in pairs]
+    rows, places = np.nonzero(crossed_dofs(model, muscles.declarations))
+    names = [f"moment_arm:{muscles.names[i]}:{dofs[d]}" for i, d in zip(rows, places, strict=True)]
     return Column(names, lambda data: -muscles.length_jacobian(data)[rows, places])
-
-
-def spanned(model: mujoco.MjModel, muscle: MuscleDeclaration) -> list[int]:
-    """Return the dofs that a muscle crosses."""
-    return [int(dof) for dof in np.flatnonzero(crossed_dofs(model, [muscle])[0])]
 
 
 class RunTable:

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 
@@ -36,15 +37,7 @@ class Surface:
 
 def _positive(surface: Surface, name: str, value: Any, unbounded: bool = False) -> float:
     """Return a size as a float; raise `GeometryError` unless it is positive and, if not `unbounded`, finite."""
-    try:
-        number = float(value)
-        good = number > 0.0 and (unbounded or math.isfinite(number))
-    except (TypeError, ValueError):
-        number, good = math.nan, False
-    if not good:
-        wanted = "positive" if unbounded else "finite and positive"
-        raise GeometryError(f"{type(surface).__name__}: {name} must be {wanted} [m], not {value!r}")
-    return number
+    return validation.positive(value, f"{type(surface).__name__}: {name}", GeometryError, "m", unbounded)
 
 
 def _axes(surface: Surface, name: str, value: Any, count: int) -> None:
@@ -186,9 +179,8 @@ class Cone(Surface):
     """A circular cone about local z, or a tapered cylinder.
 
     bottom_radius, top_radius [m]: at z = -half_length and z = half_length, not negative and not equal (the slope at
-    least
-    1e-3: use `Cylinder` instead); half_length [m], finite and positive: a range of validity, as of `Cylinder`, that
-    never reaches beyond the apex. `GeometryError` for other sizes.
+    least 1e-3: use `Cylinder` instead); half_length [m], finite and positive: a range of validity, as of `Cylinder`,
+    that never reaches beyond the apex. `GeometryError` for other sizes.
     """
 
     bottom_radius: float

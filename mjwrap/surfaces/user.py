@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.surfaces.codegen import build, library
@@ -140,7 +141,7 @@ class ImplicitSurface(CustomSurface):
             widths = ()
         if len(widths) != 3:
             raise GeometryError(f"{label}: extent must be one half width or three [m], not {extent!r}")
-        box = tuple(_positive(label, "extent", width) for width in widths)
+        box = tuple(validation.positive(width, f"{label}: extent", GeometryError, "m") for width in widths)
         self._set(build.implicit_module(label, phi, gradient, hessian, box, _size(label, size)))
 
 
@@ -156,15 +157,5 @@ def _range(label: str, name: str, value: Sequence[float]) -> tuple[float, float]
     return low, high
 
 
-def _positive(label: str, name: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not (math.isfinite(number) and number > 0.0):
-        raise GeometryError(f"{label}: {name} must be finite and positive [m], not {value!r}")
-    return number
-
-
 def _size(label: str, value: float | None) -> float | None:
-    return None if value is None else _positive(label, "size", value)
+    return None if value is None else validation.positive(value, f"{label}: size", GeometryError, "m")

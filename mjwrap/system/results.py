@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import drawn_paths, muscle_paths
@@ -149,9 +150,8 @@ class Results:
         return int(i)
 
     def _polylines(self, spacing: float | None, only: int) -> tuple[Array, NDArray[np.int64]]:
-        if spacing is not None and not (np.isfinite(spacing) and spacing > 0.0):
-            raise GeometryError(f"spacing must be finite and positive [m], not {spacing!r}")
-        state, step = self._evaluation(), 0.0 if spacing is None else float(spacing)
+        step = 0.0 if spacing is None else validation.positive(spacing, "spacing", GeometryError, "m")
+        state = self._evaluation()
         starts = np.zeros(self.n + 1, dtype=np.int64)
         given = (self._plan.routes, state.node, state.segments, state.count, state.info, step, only)
         out = np.empty((drawn_paths.polylines(*given, np.empty((0, 3)), starts), 3))

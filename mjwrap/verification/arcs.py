@@ -41,9 +41,9 @@ SAMPLES = 17  # points of a closed form at which it is looked at
 class Arcs:
     """Geodesics (m) from P along t over s, in the surface's frame.
 
-    Q, t (m, 3): where they end; jacobi (m, 4): a, a', r, r' at the end (method, section 2); bending (m): smallest
-    normal curvature along them [1/m]; spread (m): smallest r(x) / x along them, positive before a conjugate point;
-    reach (m): largest |z| [m]; points, tangents (m, k, 3): on the way, at arc lengths x (m, k).
+    Q, t (m, 3): where they end; jacobi (m, 4): a, a', r, r' at the end (docs/derivation.md, how a geodesic moves);
+    bending (m): smallest normal curvature along them [1/m]; spread (m): smallest r(x) / x along them, positive before
+    a conjugate point; reach (m): largest |z| [m]; points, tangents (m, k, 3): on the way, at arc lengths x (m, k).
     """
 
     Q: Array

@@ -10,6 +10,7 @@ import mujoco
 
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
+from mjwrap.validation import is_positive
 from mjwrap.video.camera import find_camera, look_at_muscles
 from mjwrap.video.formats import FORMATS, Writer
 from mjwrap.video.offscreen import Offscreen
@@ -45,8 +46,8 @@ class Video(RunLog):
         camera: str | int | mujoco.MjvCamera | None = None,
         option: mujoco.MjvOption | None = None,
     ) -> None:
-        require("fps", fps, 0 < fps < math.inf, "a positive number of frames per second")
-        require("speed", speed, 0 < speed < math.inf, "a positive number of simulated seconds per second")
+        require("fps", fps, is_positive(fps), "a positive number of frames per second")
+        require("speed", speed, is_positive(speed), "a positive number of simulated seconds per second")
         for name, pixels in (("width", width), ("height", height)):
             require(
                 name, pixels, int(pixels) == pixels and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384"

@@ -85,10 +85,7 @@ class Report:
             unicode = (sys.stdout.encoding or "").lower().startswith("utf")
             say(json.dumps(values, indent=1, allow_nan=False, ensure_ascii=not unicode))
         elif self._file is not None:
-            with self._file.writing():
-                text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
-                self._file.part.write_text(text + "\n", encoding="utf-8")
-            self._file.publish()
+            self._file.write_text(json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
             say(f"json:      {self._file.path}")
 
 

@@ -20,7 +20,7 @@ from mjwrap.comparison import (
     Verdict,
 )
 from mjwrap.comparison.verdict import Extreme
-from mjwrap.text import counted
+from mjwrap.text import aligned, counted
 
 TITLES = {
     Outcome.AGREE: "equal",
@@ -64,16 +64,22 @@ def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) ->
 
 def _tell_table(say: Say, found: PoseComparison, both: list[MuscleSummary]) -> None:
     shown = [o for o in Outcome if o == Outcome.AGREE or found.total(o)]
-    wide = max(6, *(len(s.name) for s in both))
-    heads = [TITLES[o] for o in shown]
-    columns = "".join(f"  {head:>{max(len(head), 6)}}" for head in heads)
-    say(
-        f"{'muscle':{wide}}  {'poses':>6}{columns}   largest difference: length [m]  velocity [m/s]  arm [m/rad]"
-    )
+    rows = [
+        [
+            "muscle",
+            "poses",
+            *(TITLES[o] for o in shown),
+            "largest difference: length [m]",
+            "velocity [m/s]",
+            "arm [m/rad]",
+        ]
+    ]
     for s in both:
-        counts = "".join(f"  {s.counts[o.name]:>{max(len(h), 6)}}" for o, h in zip(shown, heads, strict=True))
         gaps = s.length.difference, s.velocity.difference, s.moment_arm.difference
-        say(f"{s.name:{wide}}  {s.poses:>6}{counts}   {gaps[0]:>31.1e}{gaps[1]:>16.1e}{gaps[2]:>13.1e}")
+        rows.append(
+            [s.name, f"{s.poses}", *(f"{s.counts[o.name]}" for o in shown), *(f"{gap:.1e}" for gap in gaps)]
+        )
+    say("\n".join(aligned(rows)))
 
 
 def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
@@ -115,15 +121,13 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
     """Say how far both programs are from another program's tables, the worst first."""
     if not tables:
         return
-    wide = max(6, *(len(d.muscle) for d in tables))
     say("\nbeside the given tables: program minus table, in mm; spread: rms without the mean")
-    say(
-        f"{'muscle':{wide}}  program  quantity                     rows      mean    spread   largest  at [s]"
-    )
+    rows = [["muscle", "program", "quantity", "rows", "mean", "spread", "largest", "at [s]"]]
     for d in sorted(tables, key=lambda d: -d.spread):
         what = f"moment arm, {d.about}" if d.about else "length"
-        numbers = "".join(f"{millimetres(x, 4):>10}" for x in (d.mean, d.spread, d.largest))
-        say(f"{d.muscle:{wide}}  {d.program:7s}  {what:25s}  {d.rows:6d}{numbers}  {d.time:g}")
+        numbers = [millimetres(x, 4) for x in (d.mean, d.spread, d.largest)]
+        rows.append([d.muscle, d.program, what, f"{d.rows}", *numbers, f"{d.time:g}"])
+    say("\n".join(aligned(rows, (0, 1, 2))))
 
 
 def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: Sequence[str]) -> None:

@@ -12,9 +12,10 @@ import mujoco
 
 from mjwrap.calibration.judge import as_unit
 from mjwrap.mjcf import MuscleDeclaration, Node, Route, name_of
+from mjwrap.text import aligned
 
 _HEAD = ("muscle", "law", "F_max [N]", "l_opt [mm]", "l_slack [mm]", "tendon", "path")
-_NUMBERS = (2, 3, 4)
+_WORDS = (0, 1, 5, 6)  # columns that hold no numbers
 
 
 def table(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> str:
@@ -29,13 +30,7 @@ def table(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> str:
         tendon = getattr(muscle.parameters, "tendon", "rigid" if muscle.law == "mujoco" else "")
         path = " | ".join(_path(model, route) for route in muscle.routes)
         rows.append((muscle.name, muscle.law, *sizes, tendon, path))
-    wide = [max(len(row[i]) for row in rows) for i in range(len(_HEAD) - 1)]
-    lines = []
-    for *cells, path in rows:
-        pairs = enumerate(zip(cells, wide, strict=True))
-        aligned = [cell.rjust(w) if i in _NUMBERS else cell.ljust(w) for i, (cell, w) in pairs]
-        lines.append("  ".join([*aligned, path]).rstrip())
-    return "\n".join(lines)
+    return "\n".join(aligned(rows, _WORDS))
 
 
 def _size(value: float, scale: float) -> str:

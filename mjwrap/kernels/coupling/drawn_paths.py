@@ -51,6 +51,15 @@ def route_contacts(c, routes, node, seg, seg_count, out, count):
 
 
 @jit
+def _begin(muscle, last, count, starts):
+    """Write that the muscles after `muscle` up to `last` begin at row `count` to starts; return the last one."""
+    while muscle < last:
+        muscle += 1
+        starts[muscle] = count
+    return muscle
+
+
+@jit
 def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
     """Write the points of all paths to out and where each muscle begins to starts (n + 1,); return how many.
 
@@ -61,16 +70,12 @@ def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
     count = 0
     muscle = -1
     for c in range(routes.shape[0]):
-        while muscle < routes[c, R_MUSCLE]:
-            muscle += 1
-            starts[muscle] = count
+        muscle = _begin(muscle, routes[c, R_MUSCLE], count, starts)
         if only < 0 or only == muscle:
             if count > starts[muscle] and seg_count[c] > 0:
                 count = _append(out, count, math.nan, math.nan, math.nan)
             count = route_points(c, routes, node, seg, seg_count, info, spacing, out, count)
-    while muscle + 1 < starts.shape[0]:
-        muscle += 1
-        starts[muscle] = count
+    _begin(muscle, starts.shape[0] - 1, count, starts)
     return count
 
 
@@ -80,12 +85,8 @@ def contacts(routes, node, seg, seg_count, only, out, starts):
     count = 0
     muscle = -1
     for c in range(routes.shape[0]):
-        while muscle < routes[c, R_MUSCLE]:
-            muscle += 1
-            starts[muscle] = count
+        muscle = _begin(muscle, routes[c, R_MUSCLE], count, starts)
         if only < 0 or only == muscle:
             count = route_contacts(c, routes, node, seg, seg_count, out, count)
-    while muscle + 1 < starts.shape[0]:
-        muscle += 1
-        starts[muscle] = count
+    _begin(muscle, starts.shape[0] - 1, count, starts)
     return count

@@ -2,10 +2,9 @@
 space.
 
 With g = (x/a^2, y/b^2, z/c^2), half the gradient, S = g.g and T = t.A t, A = diag(1/a^2, 1/b^2, 1/c^2), the geodesic
-obeys
-p'' = -(T/S) g, and Joachimsthal's integral C = T S is constant along it. So p'' = -(C/S^2) g and K = det A / S^2 depend
-on the position alone: an equation for Stoermer's rule, which carries p and both Jacobi fields with one division a
-stage.
+obeys p'' = -(T/S) g, and Joachimsthal's integral C = T S is constant along it. So p'' = -(C/S^2) g and K = det A / S^2
+depend on the position alone: an equation for Stoermer's rule, which carries p and both Jacobi fields with one division
+a stage.
 """
 
 from __future__ import annotations

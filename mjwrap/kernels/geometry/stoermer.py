@@ -3,11 +3,9 @@ lanes.
 
 One large step of length H is done eight times over, with 1, 2, ..., 8 substeps; the errors have even powers of the
 substep only, so that fixed weights on the eight results cancel all but H^17 (Hairer, Norsett, Wanner, Solving
-Ordinary Differential Equations
-I, II.14). The columns are independent: they fill the lanes of the vector unit, which makes a step of order 16 as long
-as
-eight evaluations of f. The result without the last column is of order 14; the difference bounds the error. The surfaces
-write the rule out with their own f; lanes 0..3 are done after four rounds.
+Ordinary Differential Equations I, II.14). The columns are independent: they fill the lanes of the vector unit, which
+makes a step of order 16 as long as eight evaluations of f. The result without the last column is of order 14; the
+difference bounds the error. The surfaces write the rule out with their own f; lanes 0..3 are done after four rounds.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 
 With rho the distance from the axis and c = rho^2 u' Clairaut's constant, q = c^2/rho^2 and the normal curvature
 kappa = (1 - q)/r + q cos v / rho, the geodesic obeys rho'' = q/rho - kappa cos v, z'' = -kappa sin v, and K = cos v /
-(r rho):
-forces that depend on the position alone, without angles, for Stoermer's rule. The angle u about the axis is c times the
-integral of 1/rho^2, by the trapezoidal rule on the same substeps, extrapolated alike.
+(r rho): forces that depend on the position alone, without angles, for Stoermer's rule. The angle u about the axis is c
+times the integral of 1/rho^2, by the trapezoidal rule on the same substeps, extrapolated alike.
 """
 
 from __future__ import annotations

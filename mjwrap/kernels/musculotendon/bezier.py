@@ -3,8 +3,7 @@
 A corner joins (x0, y0, slope) to (x1, y1, slope); its end tangents meet at C, and with c = 0.1 + 0.8 curviness the
 control points are P0, P0 + c (C − P0) twice, P1 + c (C − P1) twice, P1. Counted from P0 in units of P1 − P0, a
 coordinate is then 5 u (1 − u)³ (1 + u) q + 5 u³ (1 − u)(2 − u) r + u⁵ with q, r those of the inner points: two numbers
-a coordinate.
-Outside its corners a curve goes on along its end tangents.
+a coordinate. Outside its corners a curve goes on along its end tangents.
 
 y(x) has no closed form, and inverting x(u) at every evaluation is slow. `tabulate` therefore inverts it once, to
 rounding, and fits a polynomial to the slope on each of some hundred pieces, halved until it is 1e-11 off, or 5e-15 of

@@ -125,7 +125,7 @@ def step_fiber(
     """Return what `advance_fiber` does, after a step of third order.
 
     activation, its rate [1/s], length [m] and speed [m/s], of the unit's lengthening, are those at the end of the step,
-    the others those at its beginning. Method: `third_order.py`.
+    the others those at its beginning. Method: `third_order_step.py`.
     """
     if params[m, ELASTIC] == 0.0 or duration <= 0.0:
         return _at_once(law, params, m, activation, length, fiber, duration)
