@@ -10,6 +10,7 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 import mjwrap as mw
+from mjwrap.mjcf import MuscleDeclaration, Node, Route
 
 ROOT = Path(__file__).resolve().parent.parent
 MEASURED = ("length", "velocity", "tension", "activation", "fiber_length", "status", "iterations")
@@ -51,16 +52,13 @@ class Muscles:
     def __init__(self, model: mujoco.MjModel, names: tuple[str, ...] = ("BIC", "my muscle/2")) -> None:
         self.n, self.names = len(names), list(names)
         sites = {name: model.site(name).id for name in ("origin", "via", "insertion")}
-        drum = model.geom("drum").id
+        starts = sites["origin"], model.site("my muscle/2 start").id
+        stops = Node(site=sites["via"]), Node(geom=model.geom("drum").id, surface=mw.Cylinder(0.05))
         self.declarations = [
-            SimpleNamespace(
-                name=name,
-                origin_site=sites["origin"] if i == 0 else model.site("my muscle/2 start").id,
-                insertion_site=sites["insertion"],
-                via_sites=[sites["via"]] if i == 0 else [],
-                geoms=[drum] if i == 0 else [],
-                surfaces=[mw.Cylinder(0.05)] if i == 0 else [],
-                parameters=mw.Millard2012(100.0 * (i + 1), 0.1, 0.2),
+            MuscleDeclaration(
+                name,
+                (Route(starts[min(i, 1)], stops if i == 0 else (), sites["insertion"]),),
+                mw.Millard2012(100.0 * (i + 1), 0.1, 0.2),
             )
             for i, name in enumerate(names)
         ]
