@@ -22,9 +22,13 @@ Ints = NDArray[np.int64]
 class Contact:
     """Where a path touches one obstacle.
 
-    active: whether it does; P, Q (3,): first and last contact point, world [m] (None where not active);
-    arc_length: of the geodesic from P to Q [m]; second: where the string touches the same surface again, behind a
-    hollow that it bridges (through the air over a torus' hole), else None. A via point is always active, with P = Q.
+    Attributes:
+        active: whether the path touches it. A via point is always active, with P = Q.
+        P: (3,) first contact point, world [m]; None if not active.
+        Q: (3,) last contact point, world [m]; None if not active.
+        arc_length: length of the geodesic from P to Q [m].
+        second: where the path touches the same surface again, behind a hollow that it bridges (through the air over
+            the hole of a torus); None if it does not.
     """
 
     active: bool
@@ -35,11 +39,18 @@ class Contact:
 
 
 class PathSolution(Derivatives):
-    """The answer of `solve_path`: length, contacts, and on demand points, speed and wrenches.
+    """The result of `solve_path`: length and contacts, and on demand points, speed and wrenches.
 
-    length [m]; status: `Status`; converged: status is CONVERGED; tangency_error: the norm of f over all touched
-    obstacles (30); iterations: Newton steps; evaluations: evaluations of all residuals at once; contacts: one
-    `Contact` per obstacle. Where the path was not found the length is that of the last iterate, never NaN.
+    If no path was found, the length is that of the last iterate, never NaN.
+
+    Attributes:
+        length: length of the path [m].
+        status: a `Status`.
+        converged: whether the status is CONVERGED.
+        tangency_error: norm of the residual f over all touched obstacles (30).
+        iterations: Newton steps.
+        evaluations: evaluations of all residuals at once.
+        contacts: one `Contact` per obstacle and via point.
     """
 
     def __init__(self, origin: Point, insertion: Point, node: Array, owner: Ints, saved: Array) -> None:
@@ -127,10 +138,16 @@ class PathSolution(Derivatives):
     def speed(
         self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None = None
     ) -> float:
-        """Return the lengthening speed l̇ (17) [m/s], positive when the path grows.
+        """Return the lengthening speed l̇ (17), positive when the path gets longer.
 
-        origin_velocity, insertion_velocity (3,) [m/s]; twists (n, 6), one per obstacle or via point: linear velocity of
-        the pose's origin [m/s], then angular velocity [rad/s], world frame; None where nothing moves.
+        Args:
+            origin_velocity: (3,) velocity of the origin, world [m/s].
+            insertion_velocity: (3,) velocity of the insertion, world [m/s].
+            twists: (n, 6), one per obstacle or via point: linear velocity of the pose's origin [m/s], then angular
+                velocity [rad/s], world; None if no obstacle moves.
+
+        Returns:
+            The lengthening speed [m/s].
         """
         pos = np.zeros((len(self._node) + 2, 3))
         pos[0], pos[1:-1], pos[-1] = self._origin, self._node[:, layout.POS : layout.POS + 3], self._insertion
