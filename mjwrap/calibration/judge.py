@@ -1,4 +1,4 @@
-"""Finding implausible muscle parameters: from the parameters alone, over the joints' ranges, and at rest."""
+"""Finds implausible muscle parameters: from the parameters alone, over the joints' ranges, and at rest."""
 
 from __future__ import annotations
 

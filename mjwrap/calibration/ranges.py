@@ -1,4 +1,4 @@
-"""The shortest and the longest that every muscle can be, along its geodesic path, over the ranges of all joints."""
+"""The shortest and the longest geodesic path of every muscle over the ranges of all joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a report of implausible parameters says: one finding per muscle and kind, and what could not be judged."""
+"""The report of implausible parameters: one finding per muscle and kind, and what could not be judged."""
 
 from __future__ import annotations
 

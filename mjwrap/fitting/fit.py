@@ -1,4 +1,4 @@
-"""Fits of every shape, and what they give: a posed surface, its distances from the points, and its MJCF elements."""
+"""Fits of every shape, and their results: a surface with its pose, its distances from the points, its MJCF elements."""
 
 from __future__ import annotations
 

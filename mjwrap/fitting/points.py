@@ -1,4 +1,4 @@
-"""Points to fit a surface to: vertices of a mesh geom, in a part of space."""
+"""Points to fit a surface to: vertices of a mesh geom in a region of space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a path is laid over: obstacles with world poses, via points, and their rows for the kernels."""
+"""The scene of a path: obstacles with world poses, via points, and their rows for the kernels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The answer of a single solve, and what follows from it: points, speed, wrenches."""
+"""The result of a single solve: length and contacts, and on demand points, speed and wrenches."""
 
 from __future__ import annotations
 

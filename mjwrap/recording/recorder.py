@@ -1,4 +1,4 @@
-"""`Recorder`: what happened in a run, as a file that the rerun viewer replays."""
+"""`Recorder`: writes a run into a file that the rerun viewer plays."""
 
 import math
 import numbers

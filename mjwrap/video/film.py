@@ -1,4 +1,4 @@
-"""`Video`: a simulation as a film, at simulation time."""
+"""`Video`: films a simulation at simulation time."""
 
 from __future__ import annotations
 
