@@ -11,9 +11,7 @@ TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 def rooms_named() -> dict[str, str]:
     """Return what the tree of CONTRIBUTING.md says of each folder, by its path from the root."""
     tree = next(
-        x["body"]
-        for x in FENCE.finditer(TEXT)
-        if x["language"] == "text" and x["body"].startswith("mjwrap/")
+        x["body"] for x in FENCE.finditer(TEXT) if x["language"] == "text" and x["body"].startswith("mjwrap/")
     )
     found: dict[str, str] = {}
     above: list[str] = []

@@ -7,7 +7,8 @@ Every scene runs in a process of its own, under faulthandler, in up to four ways
 - fences: the arrays of a block lie between red zones, checked when the block is freed, and the block ends at a
   protected page; a stray write kills the process, a stray read finds NaN;
 - malloc: glibc's debugging malloc, which fills new and freed memory and checks its own lists (if it is installed);
-- valgrind: memcheck over the shorter scenes (if it is installed; --valgrind, minutes for each scene): errors with compiled
+- valgrind: memcheck over the shorter scenes (if it is installed; --valgrind, minutes for each scene): errors with
+compiled
   callbacks on their stack count.
 
 A scene passes if its process ends with 0, prints nothing unexpected, and ends with the same bits as the plain run
