@@ -125,7 +125,13 @@ def _widened(short: float, long: float, total: float, height: float) -> float:
 
 @dataclass(frozen=True)
 class HillFit:
-    """A Hill-type muscle in place of MuJoCo's: its parameters, its fibre, and what could not be kept."""
+    """A Hill-type muscle in place of MuJoCo's.
+
+    Attributes:
+        muscle: the law with its parameters.
+        fiber: the fibre and tendon.
+        notes: what could not be kept, in words.
+    """
 
     muscle: DeGrooteFregly2016
     fiber: FiberFit
