@@ -1,8 +1,8 @@
-"""One tree of exceptions, beside all layers.
+"""The exceptions, in one tree.
 
-Every error that mjwrap raises for a reason that its user can mend is a `MjwrapError`; each is also the
-built-in kind that fits, so that `except ValueError` keeps working. A message names the element, says
-what is wrong with it and lists what exists instead.
+Every error that mjwrap raises for a reason that its user can correct is a `MjwrapError`. Each is also the
+built-in exception that fits, so that `except ValueError` keeps working. A message names the element, says
+what is wrong with it, and lists what exists instead.
 """
 
 

@@ -1,4 +1,4 @@
-"""How messages and tables put things into words."""
+"""The wording of messages and tables."""
 
 from collections.abc import Collection, Iterable, Sequence
 

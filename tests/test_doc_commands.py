@@ -1,4 +1,4 @@
-"""Every command line of README.md, docs/ and the help texts is one that its program takes.
+"""Every command line of README.md, CONTRIBUTING.md, docs/ and the help texts is one that its program takes.
 
 Each is read by the program's own parser, and the models, scripts, tests and extras that it names exist. Files that a
 reader brings are listed here; any other has to be made by an earlier line of its page. What of `mjwrap` takes seconds
@@ -36,6 +36,7 @@ LINES = [
 # What a reader brings, in examples about files of another program or of an earlier run.
 BROUGHT = {"arm.xml", "motion.mot", "ik.mot", "states.npz", "lengths.sto", "arms.sto", "controls.sto"}
 OPENSIM = re.compile(r"arm_MuscleAnalysis_\w+\.sto")
+CHECKERS = {"mkdocs", "ruff", "pyright", "lint-imports"}
 SHORTER = {
     "run": ["--duration", "0.02"],
     "compare": ["--samples", "3", "--bases", "0", "--duration", "0.02"],
@@ -51,6 +52,8 @@ class Read(Exception):
 def refusal(line: Line, made: set[str]) -> str | None:
     """Return what is wrong with a command line, or None; what it makes is added to `made`."""
     words = shlex.split(line.text)
+    if re.fullmatch(r"[A-Z_]+=\w+", words[0]):  # a variable of the environment, for this command alone
+        words = words[1:]
     program, rest = Path(words[0]).name, words[1:]
     if program == "python" and rest[:2] == ["-m", "mjwrap"]:
         program, rest = "mjwrap", rest[2:]
@@ -66,7 +69,7 @@ def refusal(line: Line, made: set[str]) -> str | None:
         known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
         extras = {x for word in rest for found in re.findall(r"\[(.*?)\]", word) for x in found.split(",")}
         return f"no extra {extras - set(known)}" if extras - set(known) else None
-    others = program == "mkdocs" or words == [".", ".venv/bin/activate"]
+    others = program in CHECKERS or words == [".", ".venv/bin/activate"]
     return None if others else f"what is '{words[0]}'?"
 
 
@@ -117,6 +120,8 @@ def _exists(name: str, line: Line, made: set[str]) -> bool:
 
 
 def _python(words: list[str]) -> str | None:
+    if words == ["-m", "build"]:  # installed by the line before
+        return None
     if words[0] == "-m":
         return None if importlib.util.find_spec(words[1]) else f"no module {words[1]}"
     if words[0] == "-c":

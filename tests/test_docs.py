@@ -1,4 +1,4 @@
-"""The code in README.md and docs/ runs, and prints what the page says that it prints.
+"""The code in README.md, CONTRIBUTING.md and docs/ runs, and prints what the page says that it prints.
 
 The python fences of a page run in order and share their names. A fence after a comment `<!-- no-test: reason -->` is
 not run, but read: it compiles and names what exists. A `text` fence right below a python fence is what that one

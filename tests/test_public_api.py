@@ -1,6 +1,7 @@
 """The names that other people's scripts rely on exist, with these signatures, and importing them is cheap."""
 
 import ast
+import enum
 import inspect
 import json
 import subprocess
@@ -103,6 +104,40 @@ def test_errors_have_one_root(name: str) -> None:
 def test_public_names_have_docstrings() -> None:
     names = [*SIGNATURES, *ERRORS, "MjwrapError", "Status", "PathSolution"]
     assert [name for name in names if not inspect.getdoc(find(name))] == []
+
+
+def without_sections(name: str) -> list[str]:
+    """Return what is missing in the docstring of a public name that takes more than two arguments."""
+    found = getattr(mw, name)
+    if not callable(found) or (inspect.isclass(found) and issubclass(found, Exception | enum.Enum)):
+        return []
+    arguments = list(inspect.signature(found).parameters)
+    text = inspect.getdoc(found) or ""
+    if len(arguments) <= 2:
+        return []
+    if inspect.isclass(found):  # of a result, its attributes
+        said = "Args:" in text or "Attributes:" in text
+        return [] if said else [f"{name}: Args or Attributes"]
+    missing = [f"{name}: {section}" for section in ("Args:", "Returns:") if section not in text]
+    if found is not mw.set_laws:  # it changes its argument
+        return missing
+    return [x for x in missing if "Returns" not in x]
+
+
+def test_public_functions_with_several_arguments_describe_each() -> None:
+    assert [missing for name in mw.__all__ for missing in without_sections(name)] == []
+    for name in (
+        "solve_path",
+        "solve_sweep",
+        "install",
+        "length_ranges",
+        "simulate_muscle",
+        "Obstacle",
+        "Recorder",
+    ):
+        text = inspect.getdoc(getattr(mw, name)) or ""
+        arguments = inspect.signature(getattr(mw, name)).parameters
+        assert [x for x in arguments if f"    {x}: " not in text and f"    **{x}: " not in text] == [], name
 
 
 def loaded_by(code: str) -> set[str]:

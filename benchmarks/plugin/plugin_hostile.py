@@ -1,17 +1,18 @@
-"""The engine plugin under hostile use, with tools that make a stray read or write show.
+"""The engine plugin under unusual and wrong use, with tools that detect stray reads and writes.
 
 Every scene runs in a process of its own, under faulthandler, in up to four ways:
 
 - plain: as users run it;
 - bounds: every index of the compiled code is checked (NUMBA_BOUNDSCHECK=1, with a cache of its own);
-- fences: the arrays of a block lie between red zones, looked at when the block is given back, and the block ends at a
-  page that nobody may touch; a stray write kills the process, a stray read finds numbers that are none;
-- malloc: glibc's debugging malloc, which fills what is new or freed and checks its own books (where it is installed);
-- valgrind: memcheck over the shorter scenes (where it is installed; --valgrind, minutes a scene): errors that have
-  compiled callbacks on their stack count.
+- fences: the arrays of a block lie between red zones, checked when the block is freed, and the block ends at a
+  protected page; a stray write kills the process, a stray read finds NaN;
+- malloc: glibc's debugging malloc, which fills new and freed memory and checks its own lists (if it is installed);
+- valgrind: memcheck over the shorter scenes (if it is installed; --valgrind, minutes for each scene): errors with
+compiled
+  callbacks on their stack count.
 
-A scene passes when its process ends with 0, says nothing that it should not, and ends in the same bits as users' does
-(but under bounds and valgrind, which compile differently). Exit code 1 where one does not.
+A scene passes if its process ends with 0, prints nothing unexpected, and ends with the same bits as the plain run
+(except under bounds and valgrind, which compile differently). Exit code 1 if one does not.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Scenes of hostile use of the engine plugin: each returns the mjData with which it ended."""
+"""Scenes of unusual and wrong use of the engine plugin: each returns the mjData with which it ended."""
 
 from __future__ import annotations
 

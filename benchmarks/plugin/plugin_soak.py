@@ -1,8 +1,8 @@
-"""Whether the engine plugin's memory grows: a million steps, a thousand loads of a model, copies, changes of numbers.
+"""Memory of the engine plugin over a million steps, a thousand loads of a model, copies, and changes of numbers.
 
-Every kind of use first runs a tenth of its rounds, so that caches fill; then the process's memory (resident set,
-after a garbage collection) is looked at ten times. Exit code 1 where the last look is above the first by more than the
-limit of that kind, 2 for a bad argument. Linux only: it reads /proc/self/statm.
+Every kind of use first runs a tenth of its rounds, so that caches fill. Then the process's memory (resident set,
+after a garbage collection) is measured ten times. Exit code 1 if the last measurement exceeds the first by more than
+the limit of that kind, 2 for a bad argument. Linux only: it reads /proc/self/statm.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Real models, upgraded by one call of `install` and unchanged otherwise: what is taken over, how they run, what jumps.
+"""Real models with one call of `install`, otherwise unchanged: muscles taken over, behaviour in a run, jumps.
 
 For every model: which muscles mjwrap drives and which stay native, with the reasons; a run under seeded random
 excitation (every actuator's control anew ten times a second), beside the native model under the same controls, with the
@@ -6,7 +6,7 @@ steps at which a muscle had no path; and sweeps of every joint along which the l
 jumps, and whether mjwrap's path does (`mjwrap.comparison`). A star marks a joint that an equality couples to another
 and that was moved alone. The models are MJCF files or myo_sim:NAME.
 
-Exit code 1 where a run is not finite or becomes unstable while its native twin does not, or where a path of mjwrap's
+Exit code 1 if a run is not finite or becomes unstable while its native twin does not, or if a path of mjwrap
 jumps; 2 for a bad argument.
 """
 

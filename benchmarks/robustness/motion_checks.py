@@ -1,4 +1,4 @@
-"""What a motion of a string has to obey, one function per law; each returns what it found wrong."""
+"""Laws that a motion of a path has to obey, one function per law; each returns the faults that it found."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Every muscle of myo_sim's models with an elastic tendon: is a coarse time step as quiet as a fine one?
+"""Stability of elastic tendons at coarse time steps, for every muscle of myo_sim's models.
 
 Each native muscle becomes a Hill-type muscle (`mw.hill_from_mujoco`) and runs for some seconds along a smooth random
 length within its range, under an excitation that jumps at random every 50 ms, at 5, 2 and 0.1 ms. Counted are steps
 that do not converge or are not finite, the most evaluations that a step takes, and oscillations that the finest run
 lacks: zigzags of the tension, up, down, up and down again by more than a thousandth of the maximum isometric force from
 sample to sample, beyond those of the finest run sampled at the same times. With --whole the models themselves move
-then, every muscle that mjwrap takes over on an elastic tendon, under random excitations. Exit code 1 where
-something of that is not zero or a step takes more than 10 evaluations.
+then, every muscle that mjwrap takes over on an elastic tendon, under random excitations. Exit code 1 if
+one of these counts is not zero or a step takes more than 10 evaluations.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What robustness.py counts, and its table."""
+"""The counts of robustness.py, and its table."""
 
 from __future__ import annotations
 

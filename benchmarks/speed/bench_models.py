@@ -8,7 +8,7 @@ with other excitations; its first block is not counted. Times are the CPU time o
 had reset it. Exit code 1 where a state was lost, 2 for a bad argument; with --target also 1 where a mode is slower than
 the native model.
 
---profile says where the time goes: the plugin's `compute` and `advance`, called by their addresses on the state after
+--profile shows where the time goes: the plugin's `compute` and `advance`, called by their addresses on the state after
 half a second; what MuJoCo takes to carry xfrc_applied to the joints (native steps with and without forces of 1e-200 N
 on the loaded bodies); and MuJoCo's own rest of a step.
 """

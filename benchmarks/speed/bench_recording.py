@@ -1,7 +1,7 @@
-"""What recording costs: an elbow simulated with and without a Recorder, in turns, in one run.
+"""Cost of recording: an elbow simulated with and without a Recorder, in turns, in one run.
 
-Prints medians over the turns: wall and processor time of a step (whatever else the machine does shows in the first, not
-in the second), of a call of `log` with its share of the writing, and of what is done once: making the Recorder and
+Prints medians over the turns: wall and processor time of a step (other load on the machine shows in the first, not
+in the second), of a call of `log` with its share of the writing, and of what happens once: making the Recorder and
 logging the first state (open), writing the last batch and reading the table of contents back (close). A run should be
 several batches long: --steps.
 """

@@ -1,4 +1,4 @@
-"""What drawing costs: filling a scene with a model's muscles, and with its native twin's tendons, in turns, in one run.
+"""Cost of drawing: filling a scene with a model's muscles, and with its native twin's tendons, in turns, in one run.
 
 Prints medians and 95th percentiles of `mjv_updateScene`, which needs no OpenGL, with tendons shown and not shown.
 

@@ -1,4 +1,4 @@
-"""Where the time of one warm pose goes: kernels called alone in compiled loops, and what bounds them.
+"""Profile of one warm pose: kernels called alone in compiled loops, and what limits their speed.
 
 Each part is timed with every call waiting for the one before, as in the solver, and, for geodesics, with calls that do
 not wait, so that they overlap in the processor: the difference is what several geodesics at once could gain. The

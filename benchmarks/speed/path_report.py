@@ -1,4 +1,4 @@
-"""What bench_paths.py prints about a scene, a machine and an earlier run."""
+"""The output of bench_paths.py about a scene, a machine and an earlier run."""
 
 from __future__ import annotations
 

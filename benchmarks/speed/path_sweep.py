@@ -1,4 +1,4 @@
-"""What a solver of bench_paths.py is, and what one of its timed sweeps gives."""
+"""The protocol of a solver of bench_paths.py, and the result of one of its timed sweeps."""
 
 from __future__ import annotations
 

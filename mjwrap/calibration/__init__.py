@@ -1,4 +1,4 @@
-"""Muscle parameters from data: how long muscles get, fibres and tendons that fit, and what is implausible."""
+"""Muscle parameters from data: length ranges, fibres and tendons that fit them, and implausible parameters."""
 
 from mjwrap.calibration.fibers import (
     MUJOCO_RANGE,

@@ -1,6 +1,6 @@
 """Spectral projected gradient ascent (Birgin, Martínez, Raydan 2000, doi 10.1137/S1052623497330963), a step at a time.
 
-The caller evaluates: so several searches that move different joints share each evaluation of a model.
+The caller evaluates the function, so that searches that move different joints can share each evaluation of a model.
 """
 
 from __future__ import annotations

@@ -21,9 +21,13 @@ LEAST_SLACK = 0.05  # share of the shortest length that a tendon is given at lea
 class FiberFit:
     """Fibre and tendon that take a muscle from its shortest to its longest length.
 
-    optimal_fiber_length, tendon_slack_length [m], pennation_angle at optimal fibre length [rad]; fiber_range:
-    normalised fibre lengths at the shortest and longest musculotendon length, tendon rigid; wanted: those asked for;
-    implied_slack_length [m]: the slack length that the wanted range asks for, negative where there is none.
+    Attributes:
+        optimal_fiber_length: [m].
+        tendon_slack_length: [m].
+        pennation_angle: at optimal fibre length [rad].
+        fiber_range: normalised fibre lengths at the shortest and the longest musculotendon length, with a rigid tendon.
+        wanted: the fibre range that was asked for.
+        implied_slack_length: the slack length that the wanted range needs [m]; negative if no tendon can have it.
     """
 
     optimal_fiber_length: float
@@ -59,12 +63,23 @@ def fit_fiber_and_slack(
     pennation_angle: float = 0.0,
     least_slack: float = LEAST_SLACK,
 ) -> FiberFit:
-    """Return the fibre and tendon whose fibre spans `fiber_range` between two musculotendon lengths [m].
+    """Return the fibre and tendon with which the fibre covers `fiber_range` between two musculotendon lengths.
 
-    fiber_range: normalised fibre lengths, tendon rigid; pennation_angle at optimal fibre length [rad]. Where the
-    tendon would be shorter than `least_slack` times the shortest length, or negative, it gets that length, and the
-    fibre range is widened by as much below as above (`FiberFit.exact` is false). `ModelError` for lengths or a range
-    that do not increase, and for a fibre that is shorter than its height l_o sin α₀.
+    If the tendon would be shorter than `least_slack` times the shortest length, or negative, it gets that length. The
+    fibre range is then widened by the same amount below and above, and `FiberFit.exact` is false.
+
+    Args:
+        shortest: shortest musculotendon length [m].
+        longest: longest musculotendon length [m].
+        fiber_range: normalised fibre lengths at these two lengths, with a rigid tendon.
+        pennation_angle: at optimal fibre length [rad].
+        least_slack: least tendon slack length, as a share of the shortest length.
+
+    Returns:
+        The fibre and tendon.
+
+    Raises:
+        ModelError: lengths or range do not increase, or the fibre would be shorter than its height l_o sin α₀.
     """
     if not (math.isfinite(longest) and 0.0 < shortest < longest):
         raise ModelError(
@@ -110,7 +125,13 @@ def _widened(short: float, long: float, total: float, height: float) -> float:
 
 @dataclass(frozen=True)
 class HillFit:
-    """A Hill-type muscle in place of MuJoCo's: its parameters, its fibre, and what could not be kept."""
+    """A Hill-type muscle in place of MuJoCo's.
+
+    Attributes:
+        muscle: the law with its parameters.
+        fiber: the fibre and tendon.
+        notes: what could not be kept, in words.
+    """
 
     muscle: DeGrooteFregly2016
     fiber: FiberFit
@@ -125,13 +146,24 @@ def hill_from_mujoco(
     tendon: str = "rigid",
     least_slack: float = LEAST_SLACK,
 ) -> HillFit:
-    """Return MuJoCo's muscle as a Hill-type one, whose lengths are those of the tendon, without gear.
+    """Return a Hill-type muscle in place of MuJoCo's, with the lengths of the tendon, without gear.
 
-    F_max: `force`, or scale/acc0 where that is negative, times gear, over the cosine of the pennation angle, so that
-    the tension at optimal length is MuJoCo's; fibre: over the actuator's length range from range[0] to range[1]; vmax
-    in the same metres per second. A negative implied tendon length is mended as
-    `fit_fiber_and_slack` does. The curves themselves differ. fiber_damping, tendon: those of `DeGrooteFregly2016`.
-    `ModelError` where a parameter is not possible.
+    The maximum isometric force is `force`, or scale/acc0 if that is negative, times gear, divided by the cosine of the
+    pennation angle, so that the tension at optimal length is MuJoCo's. The fibre covers range[0] to range[1] over the
+    actuator's length range. The maximum contraction velocity is the same in metres per second. The curves differ.
+
+    Args:
+        law: the muscle to convert.
+        pennation_angle: at optimal fibre length [rad].
+        fiber_damping: as in `DeGrooteFregly2016`.
+        tendon: "rigid" or "elastic".
+        least_slack: least tendon slack length, as in `fit_fiber_and_slack`; replaces a negative one.
+
+    Returns:
+        The muscle, its fibre, and notes about what could not be kept.
+
+    Raises:
+        ModelError: a parameter is not possible.
     """
     if law.prm[2] < 0.0 and not law.acc0 > 0.0:
         raise ModelError(f"force is to be scale/acc0, but acc0 is {law.acc0!r}")

@@ -1,4 +1,4 @@
-"""The joints of a model as free variables: each within its range, coupled joints following theirs."""
+"""The joints of a model as free variables, each within its range; coupled joints follow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finding implausible muscle parameters: from the parameters alone, over the joints' ranges, and at rest."""
+"""Finds implausible muscle parameters: from the parameters alone, over the joints' ranges, and at rest."""
 
 from __future__ import annotations
 
@@ -65,12 +65,22 @@ def implausible(
     rest: ArrayLike | None = None,
     limits: ParameterLimits | None = None,
 ) -> ParameterReport:
-    """Return what is implausible in the parameters of all muscles, those that stay with MuJoCo included.
+    """Find implausible parameters of all muscles, including those that stay with MuJoCo.
 
-    ranges: from `length_ranges`, which is called where None; a muscle that is not in it is judged by its parameters
-    alone. rest: pose qpos (nq,) at which no muscle should pull much without activation, qpos0 if None; limits: what
-    counts as plausible. Fibres are those of a rigid tendon, whatever the law's tendon is. Raises `StateError` for a
-    rest pose that cannot be. Neither the model nor `muscles` is changed.
+    Fibres are computed with a rigid tendon, whatever the law's tendon is. Neither the model nor `muscles` is changed.
+
+    Args:
+        muscles: the muscles.
+        ranges: from `length_ranges`, which is called if None. A muscle that is not in it is judged by its parameters
+            alone.
+        rest: (nq,) pose at which no muscle should pull much without activation; qpos0 if None.
+        limits: what counts as plausible.
+
+    Returns:
+        All findings, and what could not be judged.
+
+    Raises:
+        StateError: the rest pose is not possible.
     """
     limits = limits or ParameterLimits()
     ranges = length_ranges(muscles) if ranges is None else ranges

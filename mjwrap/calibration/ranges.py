@@ -1,4 +1,4 @@
-"""The shortest and the longest that every muscle can be, along its geodesic path, over the ranges of all joints."""
+"""The shortest and the longest geodesic path of every muscle over the ranges of all joints."""
 
 from __future__ import annotations
 
@@ -27,9 +27,15 @@ ITERATIONS = 200
 class LengthRange:
     """How short and how long a muscle gets over the ranges of the joints that move it.
 
-    shortest, longest [m], NaN where no pose had a path; shortest_pose, longest_pose: qpos (nq,); poses: evaluated ones
-    that moved this muscle or were drawn for all; without_path: how many of them had no path, by status; held: joints
-    without a range that would move it, and stayed as in the base pose.
+    Attributes:
+        muscle: its name.
+        shortest: shortest length [m]; NaN if no pose had a path.
+        longest: longest length [m]; NaN if no pose had a path.
+        shortest_pose: (nq,) qpos at the shortest length.
+        longest_pose: (nq,) qpos at the longest length.
+        poses: number of evaluated poses that moved this muscle or were drawn for all.
+        without_path: number of these without a path, by status.
+        held: joints without a range that would move the muscle; they stayed as in the base pose.
     """
 
     muscle: str
@@ -117,15 +123,28 @@ def length_ranges(
     samples: int = 512,
     seed: int = 0,
 ) -> dict[str, LengthRange]:
-    """Return the shortest and longest length of every muscle over the ranges of all joints that move it.
+    """Find the shortest and the longest length of every muscle over the ranges of all joints that move it.
 
-    The joints are moved together: up to `starts` times, `samples` seeded poses are drawn, half of them in corners of
-    the ranges, and from the best of them the length is climbed up and down with its gradient; a muscle has no more
-    such searches each way than variables that move it. Joints coupled by equality constraints follow. names: of
-    muscles, None for all; ranges: by joint, (low, high) [rad or m] or, for a ball, (0, largest angle), instead of the
-    model's; base (nq,): where joints stay that have no range (`LengthRange.held`), qpos0 if None. A search cannot
-    prove that there is no longer path; more starts and samples make it likelier.
-    Raises `ModelError` for unknown names and impossible ranges. Neither the model nor `muscles` is changed.
+    The joints are moved together. Seeded poses are drawn, half of them in corners of the ranges. From the best of
+    them the length is maximised and minimised along its gradient; a muscle has no more such searches in each
+    direction than variables that move it. Joints that are coupled by equality constraints follow. A search cannot
+    prove that there is no longer path; more starts and samples make it less likely. Neither the model nor `muscles`
+    is changed.
+
+    Args:
+        muscles: the muscles.
+        names: names of muscles; None for all.
+        ranges: (low, high) [rad or m] by joint, or for a ball joint (0, largest angle), instead of the model's.
+        base: (nq,) pose in which joints without a range stay (`LengthRange.held`); qpos0 if None.
+        starts: largest number of searches in each direction.
+        samples: number of poses drawn for each start.
+        seed: of the random poses.
+
+    Returns:
+        The length range of each muscle, by name.
+
+    Raises:
+        ModelError: a name is unknown, or a range is not possible.
     """
     for name in names or ():
         if name not in muscles.names:

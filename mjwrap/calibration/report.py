@@ -1,4 +1,4 @@
-"""What a report of implausible parameters says: one finding per muscle and kind, and what could not be judged."""
+"""The report of implausible parameters: one finding per muscle and kind, and what could not be judged."""
 
 from __future__ import annotations
 
@@ -31,9 +31,12 @@ class Implausible(enum.StrEnum):
 class ParameterLimits:
     """What counts as plausible.
 
-    fiber: normalised fibre lengths; tendon: slack length in optimal fibre lengths, about 0.1 to 12 in people; passive:
-    tension without activation at rest, in maximum isometric forces; excess: of the path over the declared length
-    range, as a share of it; force: maximum isometric force [N].
+    Args:
+        fiber: least and largest normalised fibre length.
+        tendon: least and largest slack length in optimal fibre lengths; about 0.1 to 12 in people.
+        passive: largest tension without activation at rest, in maximum isometric forces.
+        excess: largest excess of the path over the declared length range, as a share of the range.
+        force: least and largest maximum isometric force [N].
     """
 
     fiber: tuple[float, float] = (0.4, 1.6)
@@ -45,7 +48,15 @@ class ParameterLimits:
 
 @dataclass(frozen=True)
 class Finding:
-    """One implausible parameter: `value` lies beyond `limit`; both have the unit that `Implausible` gives the kind."""
+    """One implausible parameter.
+
+    Attributes:
+        muscle: its name.
+        kind: what is wrong.
+        value: the value that is beyond the limit, in the unit that `Implausible` gives.
+        limit: the limit, in the same unit.
+        sentence: the finding in words.
+    """
 
     muscle: str
     kind: Implausible
@@ -56,9 +67,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class ParameterReport:
-    """All findings, in the order of the muscles; remarks: by muscle, what could not be judged and why.
+    """All findings about the parameters of a model.
 
-    ranges: the length ranges that the fibres were judged over.
+    Attributes:
+        findings: in the order of the muscles.
+        remarks: what could not be judged and why, by muscle.
+        ranges: the length ranges over which the fibres were judged.
     """
 
     findings: tuple[Finding, ...]

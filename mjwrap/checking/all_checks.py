@@ -31,11 +31,24 @@ def check_model(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Checks:
-    """Check on a model that paths are tangent, that their derivatives and forces fit, and that nothing jumps.
+    """Check on a model that paths are tangent, that derivatives and forces agree with lengths, and that nothing jumps.
 
-    poses: random ones; samples: of each joint's sweep around the base pose (nq,), qpos0 if None, and around the middle
-    of all ranges, on which joints that are coupled to it follow; progress: called with (name, done, all). `ModelError`
-    where the model has no muscles. Limits are those of the project's design: what holds on every model.
+    The limits of the checks hold on every model.
+
+    Args:
+        model: the model; it is not changed.
+        poses: number of random poses.
+        samples: number of poses of each joint's sweep around the base pose and around the middle of all ranges. Joints
+            that are coupled to the swept one follow.
+        base: (nq,) base pose; qpos0 if None.
+        seed: of the random poses.
+        progress: called with (name, done, all).
+
+    Returns:
+        The checks, each with its worst figure.
+
+    Raises:
+        ModelError: the model has no muscles.
     """
     muscles, data = MuscleSystem(model), mujoco.MjData(model)
     if not muscles.n:

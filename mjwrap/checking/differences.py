@@ -1,4 +1,4 @@
-"""Lengths at poses around a pose, and what their differences say of l̇ and ∂l/∂q."""
+"""Lengths at poses around a pose, and the derivatives l̇ and ∂l/∂q from their differences."""
 
 from __future__ import annotations
 

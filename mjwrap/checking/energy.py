@@ -1,4 +1,4 @@
-"""Energy over a short motion without losses: what the muscles do is what the skeleton gains."""
+"""Check of energy over a short motion without losses: the work of the muscles is the energy that the skeleton gains."""
 
 from __future__ import annotations
 

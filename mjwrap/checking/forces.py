@@ -1,4 +1,4 @@
-"""Forces against the lengths that they belong to: virtual work, balance, power."""
+"""Checks of forces against lengths: virtual work, balance, power."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a check says: pass or fail, by how much, and where it was worst."""
+"""The result of a check: pass or fail, the worst figure, and where it was found."""
 
 from __future__ import annotations
 
@@ -16,10 +16,18 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Check:
-    """One law: the worst figure met so far, of how many, and where; it holds while `worst` is at most `limit`.
+    """One law, with the worst figure met so far; it holds while `worst` is at most `limit`.
 
-    what: the law in words; unit of worst and limit; skipped: why it could not be judged, else empty; remarks: what a
-    person should know beside the figure.
+    Attributes:
+        name: of the check.
+        what: the law in words.
+        limit: largest figure at which it holds.
+        unit: of `worst` and `limit`.
+        worst: largest figure so far.
+        where: where it was found.
+        count: number of figures.
+        skipped: why it could not be judged, or empty.
+        remarks: further notes for the reader.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Every joint over its range: jumps of length or slope, and where no path is found."""
+"""Checks along sweeps of every joint over its range: jumps of length or slope, and poses without a path."""
 
 from __future__ import annotations
 

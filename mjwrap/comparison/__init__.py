@@ -1,7 +1,7 @@
-"""MuJoCo's own tendons and mjwrap's paths, side by side: the same poses and motion, and which of the two is right.
+"""MuJoCo's own tendons and mjwrap's paths, side by side: the same poses, the same motion, and which path is correct.
 
 `compare_poses` sweeps every joint and draws random poses; `compare_motion` runs both forward. Every path is judged by
-its geometry (`geometry.judge`), not by trusting either program.
+its geometry (`judge_geodesic.judge`), independently of both programs.
 """
 
 from __future__ import annotations

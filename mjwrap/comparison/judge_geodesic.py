@@ -1,7 +1,7 @@
-"""Is a given path over one cylinder or sphere a true geodesic? Judged from the geometry alone, for many poses at once.
+"""Judges whether given paths over one cylinder or sphere are true geodesics, from the geometry alone, for many poses.
 
 Nothing of mjwrap's solver, nor of MuJoCo's wrapping, is used here. A path from a to b is either straight, or runs
-straight to p, along the surface to q, and straight to b. It is what a string would do if it touches the surface
+straight to p, along the surface to q, and straight to b. It is the path of a string if it touches the surface
 tangentially, follows a geodesic between p and q, passes below the surface nowhere, and is a local minimum of length.
 All points are (T, 3) in the surface's frame [m]; the axis of a cylinder is z.
 """

@@ -17,10 +17,20 @@ from mjwrap.text import counted
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump of one program's path: where, by how much [m, m/rad], and what the path was before and after.
+    """A jump of one program's path along a sweep.
 
-    base: the number of the pose around which the joint was swept; other_smooth: whether the other program had a path
-    there that did not jump; alone: whether the joint is coupled to another one, so that no motion leads there.
+    Attributes:
+        program: "MuJoCo" or "mjwrap".
+        muscle: its name.
+        sweep: what was swept.
+        at: value of the joint at the jump [rad or m].
+        length: change of length [m].
+        slope: change of slope [m/rad or m/m].
+        before: the path before the jump, in words.
+        after: the path after the jump, in words.
+        base: number of the pose around which the joint was swept.
+        other_smooth: whether the other program had a path there that did not jump.
+        alone: whether the joint is coupled to another one, so that no motion leads there.
     """
 
     program: str

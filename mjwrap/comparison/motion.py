@@ -26,11 +26,17 @@ _UNSTABLE = (
 
 @dataclass
 class MotionDifference:
-    """Both runs: time (T,), qpos (T, nq) of each, and their difference (T, nv), mjwrap minus MuJoCo, by dof names.
+    """Both runs of a comparison, and their difference.
 
-    places (nv,): the entry of qpos that shows a dof (for balls and free joints, the joint's first);
-    stopped: why a run ended early, or empty; paths:
-    mjwrap's report of muscles whose path was not found.
+    Attributes:
+        time: (T,) [s].
+        native: (T, nq) positions with MuJoCo's tendons.
+        mjwrap: (T, nq) positions with mjwrap's paths.
+        difference: (T, nv) mjwrap minus MuJoCo, by degree of freedom.
+        dofs: names of the degrees of freedom.
+        places: (nv,) the entry of qpos that shows a degree of freedom; for balls and free joints the joint's first.
+        stopped: why a run ended early, or empty.
+        paths: mjwrap's report of muscles without a path.
     """
 
     time: Array
@@ -107,9 +113,19 @@ def compare_motion(
     seed: int = 0,
     progress: Callable[[int], object] | None = None,
 ) -> MotionDifference:
-    """Run both for `duration` [s] from the same state; entries: what `Excitation` takes.
+    """Simulate a model twice from the same state, along MuJoCo's tendons and along mjwrap's paths.
 
-    key: a keyframe to start from, or -1; qpos (nq,): a start position instead. progress is called after every step.
+    Args:
+        model: the model; it is not changed.
+        entries: excitations, as `Excitation` takes them.
+        duration: of the run [s].
+        key: a keyframe to start from, or -1.
+        qpos: (nq,) a start position instead.
+        seed: for random excitations.
+        progress: called after every step.
+
+    Returns:
+        Both motions and their difference.
     """
     native_model, driven_model = pristine(model), pristine(model)
     muscles = MuscleSystem(driven_model)

@@ -1,4 +1,4 @@
-"""All poses of a comparison: which motions, in which order, and what came of them."""
+"""The comparison of both programs over all poses: which motions are compared, and the collected results."""
 
 from __future__ import annotations
 
@@ -22,7 +22,14 @@ Array = NDArray[np.float64]
 
 @dataclass
 class PoseComparison:
-    """What all poses showed: a summary for each muscle, the jumps of both programs, muscles left out and why."""
+    """What all poses of a comparison showed.
+
+    Attributes:
+        muscles: a summary for each muscle, by name.
+        jumps: the jumps of both programs.
+        left_out: muscles that were left out, with the reason.
+        poses: number of poses.
+    """
 
     muscles: dict[str, MuscleSummary] = field(default_factory=dict)
     jumps: list[Jump] = field(default_factory=list)
@@ -50,12 +57,23 @@ def compare_poses(
     each: Callable[[Batch], object] | None = None,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> PoseComparison:
-    """Compare at sweeps of every joint around the base pose and at random poses.
+    """Compare both programs along sweeps of every joint around the base pose, and at random poses.
 
-    model: taken as it is, not changed; names: muscles, None for all; samples: poses of a sweep, and random poses;
-    bases: further poses around which joints are swept, the middle of all ranges first, then random ones; base (nq,):
-    qpos0 if None; each: called with every evaluated batch; progress: called with (name, done, all) before each motion.
-    Raises `ModelError` for names that are no muscles.
+    Args:
+        model: taken as it is, not changed.
+        names: of muscles; None for all.
+        samples: number of poses of a sweep, and of random poses.
+        bases: number of further poses around which joints are swept: the middle of all ranges first, then random ones.
+        seed: of the random poses.
+        base: (nq,) base pose; qpos0 if None.
+        each: called with every evaluated batch.
+        progress: called with (name, done, all) before each motion.
+
+    Returns:
+        A summary for each muscle, and the jumps of both programs.
+
+    Raises:
+        ModelError: a name is not that of a muscle.
     """
     model = pristine(model)
     muscles = MuscleSystem(model)

@@ -1,8 +1,8 @@
-"""Lengths and moment arms that another program has computed, beside MuJoCo's and mjwrap's at the same poses.
+"""Lengths and moment arms from another program, beside MuJoCo's and mjwrap's at the same poses.
 
 OpenSim's MuscleAnalysis writes such tables: lengths of all muscles over time, and moment arms about one coordinate in
-each file. Models of the same person in two programs seldom have the same zero of length, so the difference is told
-with and without its mean.
+each file. Models of the same person in two programs seldom have the same zero of length, so the difference is
+reported with and without its mean.
 """
 
 from __future__ import annotations
@@ -26,10 +26,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TableDifference:
-    """How far one program is from a table, for one muscle: program minus table over all rows where it has a path.
+    """How far one program is from a table, for one muscle: program minus table, over all rows where it has a path.
 
-    quantity: "length" [m] or "moment arm" [m]; about: the joint of the moment arm, or ""; rows: how many count; mean,
-    rms, spread (rms about the mean), largest, and time [s] and the two values there.
+    Attributes:
+        muscle: its name.
+        program: "MuJoCo" or "mjwrap".
+        quantity: "length" [m] or "moment arm" [m].
+        about: the joint of the moment arm, or "".
+        rows: number of rows that count.
+        mean: mean difference [m].
+        rms: root mean square of the difference [m].
+        spread: root mean square about the mean [m].
+        largest: largest difference [m].
+        time: its time [s].
+        value: the program's value there [m].
+        table: the table's value there [m].
     """
 
     muscle: str
@@ -69,14 +80,26 @@ def compare_tables(
     *,
     each: Callable[[Beside], object] | None = None,
 ) -> list[TableDifference]:
-    """Return how far MuJoCo's tendons and mjwrap's paths are from tables, muscle by muscle.
+    """Compare MuJoCo's tendons and mjwrap's paths with tables of another program, muscle by muscle.
 
-    time (T,), qpos (T, nq): the motion; a table's rows are looked up in it, with straight lines between. Columns are
-    muscles, a path before the name is left out, and so are the marks of `mjwrap run --columns`; moment_arms: by the
-    joint's name, positive where the muscle's tension increases the coordinate; each: called with the curves of every
-    muscle in the tables. A tendon that only holds a place for
-    another route is not compared. Raises `TableError` where a table has none of the muscles, or rows outside the
-    motion.
+    A column belongs to the muscle of its name; a path before the name and the prefixes of `mjwrap run --columns` are
+    ignored. Values of a table are compared at its own times, at poses that are interpolated linearly in the motion. A
+    tendon that only holds a place for another route is not compared.
+
+    Args:
+        model: the model.
+        time: (T,) times of the motion [s].
+        qpos: (T, nq) the motion.
+        lengths: a table of lengths [m].
+        moment_arms: tables of moment arms [m] by the joint's name, positive where the muscle's tension increases the
+            coordinate.
+        each: called with the curves of every muscle in the tables.
+
+    Returns:
+        The differences.
+
+    Raises:
+        TableError: a table has none of the muscles, or rows outside the motion.
     """
     model = pristine(model)
     found: list[TableDifference] = []

@@ -1,4 +1,4 @@
-"""What MuJoCo's tendons did at a pose: their routes, and the points of the path that they took."""
+"""MuJoCo's tendons at a pose: their routes, and the points of their paths."""
 
 from __future__ import annotations
 

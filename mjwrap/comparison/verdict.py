@@ -1,4 +1,4 @@
-"""Which of two paths is right, pose by pose, and in a sentence for each muscle."""
+"""Verdicts on the paths of both programs, pose by pose, collected for each muscle."""
 
 from __future__ import annotations
 

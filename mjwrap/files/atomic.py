@@ -1,4 +1,4 @@
-"""Files that appear whole under their name or not at all, and what else those who write them share."""
+"""Files that are either complete under their name or absent, and what their writers share."""
 
 import contextlib
 import os

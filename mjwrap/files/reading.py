@@ -1,4 +1,4 @@
-"""Reading tables over time, with errors that say where in the file something is wrong."""
+"""Reading tables over time, with errors that say where in the file a problem is."""
 
 from __future__ import annotations
 

@@ -16,10 +16,17 @@ SUFFIXES = (".sto", ".mot", ".csv", ".npz")
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns of numbers over time: time (T,) [s], increasing; names (n,), each its own; values (T, n).
+    """Columns of numbers over time; `table["name"]` is a column (T,).
 
-    metadata: what the header of a .sto or .mot file says; source: the file that it was read from. `TableError` where
-    these do not fit together. `table["name"]` is a column (T,).
+    Args:
+        time: (T,) increasing times [s].
+        names: n different names of the columns.
+        values: (T, n) numbers.
+        metadata: entries of the header of a .sto or .mot file.
+        source: the file from which the table was read.
+
+    Raises:
+        TableError: these do not fit together.
     """
 
     time: Array

@@ -1,4 +1,4 @@
-"""Writing tables over time: whole, or row by row while a run goes on."""
+"""Writing tables over time, complete or row by row during a run."""
 
 from __future__ import annotations
 

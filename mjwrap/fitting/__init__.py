@@ -1,7 +1,7 @@
-"""Smooth wrapping surfaces from points, such as the vertices of a bone's mesh (docs/surfaces.md).
+"""Smooth wrapping surfaces fitted to points, such as the vertices of a bone's mesh (docs/surfaces.md).
 
-A path needs a surface with a continuous curvature; a mesh has none. So a surface of a simple shape is fitted to the
-part of the bone over which muscles run, by least squares on the points' distances, which the result holds.
+A path needs a smooth surface, which a mesh is not. So a surface of a simple shape is fitted to the part of the bone
+over which muscles run, by least squares on the points' distances. The result includes these distances.
 """
 
 from mjwrap.fitting.fit import (

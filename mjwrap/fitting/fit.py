@@ -1,4 +1,4 @@
-"""Fits of every shape, and what they give: a posed surface, its distances from the points, and its MJCF elements."""
+"""Fits of every shape, and their results: a surface with its pose, its distances from the points, its MJCF elements."""
 
 from __future__ import annotations
 
@@ -27,10 +27,14 @@ MARK = 0.001  # radius of the sphere geom that carries a shape which MuJoCo has 
 class Fit:
     """A surface fitted to points, in the points' frame.
 
-    surface: cylinders and cones are as long as the points reach; pos (3,) [m], quat (4,) w, x, y, z: its pose;
-    distances (m,): of the points from it [m], positive where they stick out (of cylinders and cones without their
-    ends); growth: by how much a small error of the points can grow on parts of the surface where there are none, about
-    1 where they cover all of it.
+    Attributes:
+        surface: the surface. Cylinders and cones are as long as the points reach.
+        pos: (3,) origin of its frame [m].
+        quat: (4,) orientation of its frame, w, x, y, z.
+        distances: (m,) distances of the points from it [m], positive where they stick out. Cylinders and cones count
+            as endless here.
+        growth: factor by which a small error of the points can grow on parts of the surface without points; about 1 if
+            the points cover all of it.
     """
 
     surface: Surface

@@ -1,4 +1,4 @@
-"""Least squares on true distances: the surface of a shape that comes nearest to given points."""
+"""Least squares on true distances: the surface of a shape that is nearest to given points."""
 
 from __future__ import annotations
 

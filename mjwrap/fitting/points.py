@@ -1,4 +1,4 @@
-"""Points to fit a surface to: vertices of a mesh geom, in a part of space."""
+"""Points to fit a surface to: vertices of a mesh geom in a region of space."""
 
 from __future__ import annotations
 
@@ -17,11 +17,21 @@ _MESH = 7  # mjtGeom; only mjcf, system and plugin know mujoco itself
 
 
 def mesh_points(model: Any, geom: str | int, region: Region | None = None, data: Any = None) -> Array:
-    """Return the vertices (m, 3) of a mesh geom [m], in the frame of its body or, with `data`, in the world.
+    """Return the vertices of a mesh geom.
 
-    model, data: mujoco's MjModel and MjData, its kinematics up to date; geom: name or id; region: a function of points
-    (m, 3) that says which to keep (m,), such as `in_box`, `in_ball` or `beyond` make. Raises `ModelError` for a geom
-    that does not exist or is no mesh, with the names of those that are.
+    Args:
+        model: a mujoco.MjModel.
+        geom: name or id of the geom.
+        region: a function of points (m, 3) that returns which of them to keep (m,), such as `in_box`, `in_ball` and
+            `beyond` make; None for all.
+        data: a mujoco.MjData with up-to-date kinematics, for points in the world; None for points in the frame of the
+            geom's body.
+
+    Returns:
+        The points (m, 3) [m].
+
+    Raises:
+        ModelError: the geom does not exist or is not a mesh. The message lists the mesh geoms.
     """
     index = _mesh_geom(model, geom)
     mesh = int(model.geom_dataid[index])

@@ -1,8 +1,9 @@
-"""Signed distances of points to surfaces, with what a fit needs of them: nearest points, normals, derivatives.
+"""Signed distances of points to surfaces, with nearest points, normals and derivatives for a fit.
 
-All in the surface's own frame. A surface that changes by a small displacement of its points changes the distance d of a
-point outside by minus the normal part of the displacement at the nearest point; so derivatives need no difference
-quotients. Unlike the classes in `mjwrap.surfaces` the shapes here have no ends: cylinders and cones go on for ever.
+All in the surface's own frame. When a surface changes by a small displacement of its points, the distance d of a
+point outside changes by minus the normal part of the displacement at the nearest point; so derivatives need no
+difference quotients. Unlike the classes in `mjwrap.surfaces` the shapes here have no ends: cylinders and cones are
+endless.
 """
 
 from __future__ import annotations

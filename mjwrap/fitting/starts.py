@@ -1,7 +1,8 @@
-"""First guesses of a fit, by linear least squares: frames and sizes from which the real one converges.
+"""First guesses of a fit, by linear least squares: frames and sizes from which the nonlinear fit converges.
 
-Points come centred on their mean and scaled to a mean square distance of one. Several guesses are made, since an axis
-cannot be told from the points' principal axes alone where they cover a part of a surface; the best fit wins.
+Points come centred on their mean and scaled to a mean square distance of one. Several guesses are made, because the
+points' principal axes do not determine the axis of a surface if the points cover only a part of it. The best fit is
+used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Among the frames in which a surface looks the same, the one that is turned least from the points' own axes."""
+"""Chooses, among the frames in which a surface looks the same, the one that is turned least from the points' own
+axes."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The paper's three solvers as a method laboratory, on NumPy: NR, BFGS and Broyden's method (BR).
+"""The paper's three solvers, on NumPy, for comparison: NR, BFGS and Broyden's method (BR).
 
-`solve_chain` solves a whole path; `ChainProblem`, a solver of `METHODS` and `iterate` are the parts it is made of.
+`solve_chain` solves a whole path; `ChainProblem`, a solver of `METHODS` and `iterate` are its parts.
 """
 
 from mjwrap.methods.bfgs import Bfgs

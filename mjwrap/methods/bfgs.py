@@ -22,11 +22,16 @@ class BfgsState(State):
 
 @dataclass(frozen=True)
 class Bfgs:
-    """x ← x − αHg on ‖f‖², H from I by the BFGS update of the inverse Hessian.
+    """x ← x − αHg on ‖f‖², with H from I by the BFGS update of the inverse Hessian.
 
-    step: a fixed α (the paper's 1.0), or "armijo", backtracking with a and b. The gradient is 2Jᵀf with J by central
-    differences. An update without positive curvature is left out, and a direction that does not descend starts H
-    afresh.
+    The gradient g is 2Jᵀf with J by central differences. An update without positive curvature is left out. If a
+    direction does not descend, H starts again from I.
+
+    Args:
+        step: a fixed α (the paper's 1.0), or "armijo", backtracking with a and b.
+        a: share of the decrease predicted by the slope that a step must reach.
+        b: factor by which a step is shortened.
+        max_iterations: largest number of steps.
     """
 
     step: float | Literal["armijo"] = "armijo"

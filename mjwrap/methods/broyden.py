@@ -23,11 +23,19 @@ class BroydenState(State):
 
 @dataclass(frozen=True)
 class Broyden:
-    """x ← x + αd, d = −L⁺f the shortest least-squares step, L ← L + θ (y − Ls)sᵀ/(sᵀs).
+    """x ← x + αd, with d = −L⁺f, the shortest least-squares step, and L ← L + θ (y − Ls)sᵀ/(sᵀs).
 
-    L starts as J by central differences. step: a fixed α (the paper's 1.0), or "line_search", the derivative-free
-    search (29). d lies in the row space of L and so does every update, so that no step ever goes along the null
-    direction (the length of (u', v')).
+    L starts as J by central differences. d and every update lie in the row space of L, so that no step goes along
+    the null direction (the length of (u', v')).
+
+    Args:
+        step: a fixed α (the paper's 1.0), or "line_search", the derivative-free search (29).
+        theta: θ of the update.
+        sigma1: σ₁ of the line search (29).
+        sigma2: σ₂ of the line search.
+        rho: ρ of the line search.
+        shrink: factor by which the line search shortens a step.
+        max_iterations: largest number of steps.
     """
 
     step: float | Literal["line_search"] = "line_search"

@@ -1,4 +1,4 @@
-"""What the three methods share: a solver is init, advance, terminate; an outcome carries its status."""
+"""The iteration that the three methods share: a solver is init, advance, terminate; an outcome carries its status."""
 
 from __future__ import annotations
 
@@ -43,7 +43,15 @@ class Solver(Protocol, Generic[S]):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How an iteration ended: the last finite unknowns x (5n,), ‖f‖ or ‖h‖ there, its cost, whether error ≤ tol."""
+    """How an iteration ended.
+
+    Attributes:
+        x: (5n,) the last finite unknowns.
+        error: ‖f‖ or ‖h‖ there.
+        iterations: number of steps.
+        evaluations: number of evaluations.
+        converged: whether error is at most tol.
+    """
 
     x: Array
     error: float
@@ -53,9 +61,18 @@ class Outcome:
 
 
 def iterate(solver: Solver[Any], problem: ChainProblem, x: Array, tol: float = 1e-10) -> Outcome:
-    """Run a solver from x (5n,) until its residual's norm is at most tol, or it is stuck or out of iterations.
+    """Run a solver until the norm of its residual is at most tol, or until it is stuck or out of iterations.
 
-    An iterate that is not finite ends it at the one before.
+    An iterate that is not finite ends the iteration at the one before.
+
+    Args:
+        solver: one of `METHODS`.
+        problem: the problem.
+        x: (5n,) start values of the unknowns.
+        tol: largest norm of the residual.
+
+    Returns:
+        The last unknowns, with their residual and cost.
     """
     before = problem.evaluations
     with np.errstate(all="ignore"):

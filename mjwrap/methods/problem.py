@@ -56,10 +56,18 @@ class Geometry:
 class ChainProblem:
     """Touched obstacles in a row between two fixed points: residuals, their Jacobian, the length.
 
-    origin, insertion (3,): world [m]; surfaces: n of `Cylinder`, `Sphere`; positions (n, 3) [m] and rotations
-    (n, 3, 3) of their frames in the world. residual: "tangency" is f (18), six numbers per obstacle;
-    "normals_binormals" is h (31), four, which folded paths satisfy as well. `evaluations` counts residuals of the whole
-    row, those of finite differences included; `radii` (n,) [m].
+    Args:
+        origin: (3,) world [m].
+        insertion: (3,) world [m].
+        surfaces: n of `Cylinder`, `Sphere`.
+        positions: (n, 3) of their frames, world [m].
+        rotations: (n, 3, 3) surface to world.
+        residual: "tangency" is f (18), six numbers per obstacle; "normals_binormals" is h (31), four numbers, which are
+            also zero for folded paths.
+
+    Attributes:
+        evaluations: residuals of the whole row so far, including those of finite differences.
+        radii: (n,) [m].
     """
 
     def __init__(
@@ -89,10 +97,18 @@ class ChainProblem:
         return np.tile(FIRST_GUESS, self.n)
 
     def unknowns(self, P: Array, t: Array, s: Array) -> Array:
-        """Return the unknowns (5n,) of geodesics through P (n, 3) along t (n, 3), world, of length s (n,) [m].
+        """Return the unknowns of given geodesics.
 
-        P and t need not lie exactly on the surface and its tangent plane. A sphere's chart is turned so that P is far
-        from its poles, which are no place for (u', v').
+        P and t need not lie exactly on the surface and its tangent plane. A sphere's chart is turned so that P is
+        far from its poles, where (u', v') is not defined.
+
+        Args:
+            P: (n, 3) first contact points, world [m].
+            t: (n, 3) tangents there, world.
+            s: (n,) arc lengths [m].
+
+        Returns:
+            The unknowns (5n,).
         """
         x = np.zeros((self.n, UNKNOWNS))
         for k in range(self.n):

@@ -1,4 +1,4 @@
-"""The scene of one path and the state of its outer loop: which obstacles are touched, and where."""
+"""The scene of one path, and the state of its outer loop: which obstacles are touched, and at which points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A whole path with one of the paper's methods: which obstacles it touches, and the coupled system over those."""
+"""Solves a whole path with one of the paper's methods: finds the touched obstacles and solves the coupled system."""
 
 from __future__ import annotations
 
@@ -17,13 +17,22 @@ from mjwrap.surfaces import Surface
 
 @dataclass(frozen=True)
 class MethodResult:
-    """A path, found or not.
+    """A path of one of the paper's methods, found or not.
 
-    P, Q (n, 3): contact points, world [m]; t (n, 3): unit tangent at P, world; s (n,): arc lengths [m], at least 0 on a
-    converged path; active (n,): touched. On an untouched obstacle P = Q is the point next to the path, t the path's
-    direction there and s = 0. length [m]; tangency_error: ‖f‖ (30) over the touched obstacles; residual_error: norm of
-    the residual solved for, ‖h‖ with `residual="normals_binormals"`. converged: tangency_error ≤ tol and nothing left
-    to drop or take in.
+    On an untouched obstacle P = Q is the point next to the path, t the path's direction there, and s = 0.
+
+    Attributes:
+        P: (n, 3) first contact points, world [m].
+        t: (n, 3) unit tangents at P, world.
+        s: (n,) arc lengths [m], not negative on a converged path.
+        active: (n,) whether each obstacle is touched.
+        Q: (n, 3) last contact points, world [m].
+        length: [m].
+        iterations: of the method.
+        evaluations: of the residual of the whole path.
+        tangency_error: ‖f‖ (30) over the touched obstacles.
+        residual_error: norm of the residual that was solved, ‖h‖ with `residual="normals_binormals"`.
+        converged: tangency_error is at most tol, and no obstacle has to be dropped or added.
     """
 
     P: Array
@@ -54,11 +63,26 @@ def solve_chain(
 ) -> MethodResult:
     """Find a path over n obstacles with one of the paper's methods.
 
-    origin, insertion (3,), positions (n, 3): world [m]; rotations (n, 3, 3): surface to world. start: P (n, 3),
-    t (n, 3), s (n,), active (n,) of a path nearby; None is the paper's first guess, with every obstacle touched. An
-    obstacle is dropped when its arc comes out negative and taken in where a straight segment runs below its surface;
-    options of the method hold for each solve in between. A path that is not found has `converged` False;
-    `GeometryError` is for input that describes no problem.
+    An obstacle is dropped if its arc length becomes negative, and added if a straight segment passes below its surface.
+
+    Args:
+        method: "nr", "bfgs" or "broyden".
+        origin: (3,) world [m].
+        insertion: (3,) world [m].
+        surfaces: n of `Cylinder`, `Sphere`.
+        positions: (n, 3) of their frames, world [m].
+        rotations: (n, 3, 3) surface to world.
+        start: P (n, 3), t (n, 3), s (n,), active (n,) of a path nearby; None for the paper's first guess, with every
+            obstacle touched.
+        tol: largest norm of the residual.
+        residual: "tangency" or "normals_binormals", as in `ChainProblem`.
+        **options: options of the method, used for each solve between changes of the touched obstacles.
+
+    Returns:
+        The path; if it was not found, `converged` is False.
+
+    Raises:
+        GeometryError: the input describes no problem.
     """
     solver = make_solver(method, **options)
     scene = Scene(origin, insertion, surfaces, positions, rotations, residual)

@@ -31,15 +31,23 @@ HillLaw = DeGrooteFregly2016 | Millard2012
 def set_laws(
     spec: mujoco.MjSpec, laws: Mapping[str, HillLaw], dynamics: ActivationDynamics | None = None
 ) -> None:
-    """Give muscles of an MjSpec a Hill-type law each, by the name of their actuator, or of their tuple without one.
+    """Give Hill-type laws to muscles of an MjSpec.
 
-    The spec is changed in place and compiles in MuJoCo without mjwrap. A muscle that a tuple declares keeps its route
-    and gets the new law; a native one gets a tuple. Where the law has an elastic tendon, or `dynamics` are given,
-    mjwrap integrates the states: the actuator becomes `dyntype="user" actdim="2"`, keeps control and control range and
-    pulls nothing without mjwrap; the time constants of a native muscle go with it unless `dynamics` replace them
-    (MuJoCo's smoothing between them and a force range of the actuator do not), and keyframes get a fibre length of 0.
-    `ModelError` for a name that no muscle has, for an actuator that pulls no tendon or pushes, and for what is no law
-    with a fibre, before anything is changed.
+    The spec is changed in place, and compiles in MuJoCo without mjwrap. A muscle that a tuple declares keeps its route
+    and gets the new law; a native muscle gets a tuple. If the law has an elastic tendon, or `dynamics` are given,
+    mjwrap integrates the states. The actuator then becomes `dyntype="user" actdim="2"`, keeps its control and
+    control range, and does not pull without mjwrap. Keyframes get a fibre length of 0. A native muscle keeps its
+    time constants unless `dynamics` replace them; MuJoCo's smoothing between them and a force range of the actuator
+    are not kept.
+
+    Args:
+        spec: the model.
+        laws: laws by the name of the muscle's actuator, or of its tuple if it has no actuator.
+        dynamics: activation dynamics of all these muscles; None to keep those of the actuators.
+
+    Raises:
+        ModelError: no muscle has the name, an actuator pulls no tendon or pushes, or a law has no fibre. The spec is
+            not changed then.
     """
     actuators = {actuator.name: actuator for actuator in spec.actuators}
     tuples = {entry.name: entry for entry in spec.tuples if "mjwrap" in entry.name}

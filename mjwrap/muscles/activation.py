@@ -14,12 +14,19 @@ TIMES = {"zajac": (0.010, 0.040), "degroote_fregly_2016": (0.015, 0.060)}  # [s]
 
 @dataclass(frozen=True)
 class ActivationDynamics:
-    """First-order dynamics from excitation to activation, both held in [0, 1].
+    """First-order dynamics from excitation to activation, both clamped to [0, 1].
 
-    dynamics: "zajac", MuJoCo's and OpenSim's two-rate form (doi 10.1115/1.4023390), or "degroote_fregly_2016", smooth
-    in the excitation (doi 10.1007/s10439-016-1591-9). activation_time, deactivation_time [s] > 0; None: 0.010 and 0.040
-    for the former, 0.015 and 0.060 for the latter. smoothing > 0: the latter's b, larger is sharper. `ModelError`
-    otherwise.
+    Args:
+        dynamics: "zajac", MuJoCo's and OpenSim's form with two rates (doi 10.1115/1.4023390), or
+            "degroote_fregly_2016", smooth in the excitation (doi 10.1007/s10439-016-1591-9).
+        activation_time: time constant of activation [s], positive; None for 0.010 with the former and 0.015 with the
+            latter.
+        deactivation_time: time constant of deactivation [s], positive; None for 0.040 with the former and 0.060 with
+            the latter.
+        smoothing: b of the latter, positive; larger is sharper.
+
+    Raises:
+        ModelError: a value is not possible.
     """
 
     dynamics: str = "zajac"

@@ -19,10 +19,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MuscleTrial:
-    """A muscle's history, (T,) each: time [s], length and fiber_length [m], activation [-], tension [N].
+    """A muscle's history, as arrays (T,).
 
-    iterations: evaluations of the balance of fibre and tendon, 0 with a rigid tendon; status: codes of
-    `mjwrap/kernels/musculotendon/fiber.py` (0 normal, 1 at the minimum fibre length, 2 slack tendon, 3 not converged).
+    Attributes:
+        time: [s].
+        length: musculotendon length [m].
+        activation: activation, 0 to 1.
+        fiber_length: [m].
+        tension: [N].
+        iterations: evaluations of the balance of fibre and tendon; 0 with a rigid tendon.
+        status: codes of `mjwrap/kernels/musculotendon/fiber.py`: 0 normal, 1 at the minimum fibre length, 2 slack
+            tendon, 3 not converged.
     """
 
     time: Array
@@ -46,13 +53,26 @@ def simulate_muscle(
     initial_fiber_length: float | None = None,
     dynamics: ActivationDynamics | None = None,
 ) -> MuscleTrial:
-    """Simulate one muscle whose musculotendon length is prescribed, by the same steps as a `MuscleSystem` takes.
+    """Simulate one muscle along a prescribed musculotendon length, with the same steps as in a `MuscleSystem`.
 
-    time (T,): increasing [s]; length: (T,) or one number [m]; either excitation, held from each time to the next, with
-    `dynamics` and `initial_activation`, or activation, (T,) or one number each. velocity (T,) [m/s]: lengthening speed;
-    None: central differences of length. An elastic tendon takes one implicit step from each time to
-    the next, from initial_fiber_length [m], or from static equilibrium. `StateError` for arrays that do
-    not fit, and for numbers that are not finite or not in their range.
+    Give either `excitation` or `activation`. An elastic tendon takes one implicit step from each time to the next.
+
+    Args:
+        law: the muscle.
+        time: (T,) increasing times [s].
+        length: (T,) or one number, musculotendon length [m].
+        excitation: (T,) or one number, held from each time to the next.
+        activation: (T,) or one number.
+        velocity: (T,) lengthening speed [m/s]; None for central differences of the length.
+        initial_activation: at the first time, with `excitation`.
+        initial_fiber_length: at the first time [m], with an elastic tendon; None for static equilibrium.
+        dynamics: activation dynamics, with `excitation`.
+
+    Returns:
+        Tension, fibre length and activation at every time.
+
+    Raises:
+        StateError: arrays do not fit, or numbers are not finite or not in their range.
     """
     t = np.array(time, dtype=np.float64)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():

@@ -25,21 +25,26 @@ FIBERS = (tension.DEGROOTE_FREGLY, tension.MILLARD)
 class Umberger2010:
     """Metabolic constants of a muscle, with OpenSim's defaults (its `Umberger2010MuscleMetabolicsProbe`).
 
-    - slow_twitch_ratio of the fibres, 0..1
-    - specific_tension [Pa] and density [kg/m^3] give the muscle's mass, max_isometric_force / specific_tension
-      * density * optimal_fiber_length, unless mass [kg] does
-    - aerobic_factor: 1.5 for primarily aerobic activities, 1.0 for others
-    - minimum_heat_rate [W/kg], 0 for none
-    - effort scales excitation, activation and active force, where the muscles of a model work against each other more
-      than a person's do
-    - recruitment: slow-twitch fibres are recruited first, and the ratio holds at full excitation (Bhargava et al. 2004,
-      doi 10.1016/S0021-9290(03)00239-2)
-    - negative_work: lengthening counts as negative work and gives more heat (Umberger et al. 2003,
-      doi 10.1080/1025584031000091678)
-    - forbid_negative_power: more heat where a muscle would win energy
+    With the last three options False it is the model as published in 2010 (doi 10.1098/rsif.2010.0084).
 
-    With the last three False it is the model as published in 2010 (doi 10.1098/rsif.2010.0084). `ModelError` where a
-    number is not finite, or not in its range.
+    Args:
+        slow_twitch_ratio: share of slow-twitch fibres, 0 to 1.
+        specific_tension: [Pa]. With the density it gives the muscle's mass, max_isometric_force / specific_tension
+            * density * optimal_fiber_length, unless `mass` is given.
+        density: [kg/m^3].
+        mass: [kg]; None to compute it.
+        aerobic_factor: 1.5 for primarily aerobic activities, 1.0 for others.
+        minimum_heat_rate: [W/kg]; 0 for none.
+        effort: scales excitation, activation and active force, for models whose muscles work against each other more
+            than a person's do.
+        recruitment: slow-twitch fibres are recruited first, and the ratio holds at full excitation (Bhargava et al.
+            2004, doi 10.1016/S0021-9290(03)00239-2).
+        negative_work: lengthening counts as negative work and gives more heat (Umberger et al. 2003,
+            doi 10.1080/1025584031000091678).
+        forbid_negative_power: add heat where the metabolic power would be negative.
+
+    Raises:
+        ModelError: a number is not finite or not in its range.
     """
 
     slow_twitch_ratio: float = 0.5
@@ -87,26 +92,31 @@ class Umberger2010:
 
 @dataclass(frozen=True, eq=False)
 class Energetics:
-    """Energies and powers of n muscles at one instant, each array (n,); power is positive where it is delivered.
+    """Energies and powers of n muscles at one instant, as arrays (n,); power is positive where it is delivered.
 
-    A fibre or tendon that shortens under tension delivers power, one that is stretched takes it up. Muscles without
+    A fibre or tendon that shortens under tension delivers power; one that is stretched takes it up. Muscles without
     fibres (MuJoCo's, the path actuator) have `muscle_power` only, the rest is zero. `tendon_power` and `tendon_energy`
-    are zero with a rigid tendon; heats, work and `metabolic_power` where no `Umberger2010` was given.
+    are zero with a rigid tendon. Heats, work and `metabolic_power` are zero without an `Umberger2010`.
 
-    - fiber_velocity [m/s]: lengthening positive
-    - active_power, passive_power, damping_power [W]: of the cross-bridges, of the parallel elastic element, and of the
-      damping, which is never positive; fiber_power is their sum
-    - tendon_power [W]: minus the rate of tendon_energy
-    - muscle_power [W]: minus tension times lengthening speed, what reaches the skeleton; the sum of fiber_power,
-      tendon_power and unbalanced_power
-    - unbalanced_power [W]: zero but where a law clamps: a fibre that pushes on a rigid tendon, or an undamped one
-      beyond the range of its force-velocity curve
-    - tendon_energy, fiber_energy [J]: held by the tendon and by the parallel elastic element, zero without strain
-    - activation_heat, maintenance_heat [W]: together the heat of a muscle that is active at constant length
-    - shortening_heat [W]: of shortening or lengthening, with what `forbid_negative_power` adds
-    - resting_heat [W]: what lifts the three to `minimum_heat_rate`
-    - mechanical_work [W]: what the metabolic model counts of active_power
-    - metabolic_power [W]: the four heats and the work; without the basal rate of the body (`basal_power`)
+    Attributes:
+        fiber_velocity: [m/s], positive when lengthening.
+        active_power: power of the cross-bridges [W].
+        passive_power: power of the parallel elastic element [W].
+        damping_power: power of the damping [W], never positive.
+        fiber_power: sum of the three powers above [W].
+        tendon_power: minus the rate of tendon_energy [W].
+        muscle_power: minus tension times lengthening speed [W], the power that reaches the skeleton; the sum of
+            fiber_power, tendon_power and unbalanced_power.
+        unbalanced_power: [W], zero except where a law limits the force: a fibre that would push on a rigid tendon,
+            or an undamped fibre beyond the range of its force-velocity curve.
+        tendon_energy: energy stored in the tendon [J], zero without strain.
+        fiber_energy: energy stored in the parallel elastic element [J], zero without strain.
+        activation_heat: [W]; with maintenance_heat the heat of a muscle that is active at constant length.
+        maintenance_heat: [W].
+        shortening_heat: heat of shortening or lengthening [W], including what `forbid_negative_power` adds.
+        resting_heat: what raises the three heats to `minimum_heat_rate` [W].
+        mechanical_work: the part of active_power that the metabolic model counts [W].
+        metabolic_power: sum of the four heats and the work [W], without the basal rate of the body (`basal_power`).
     """
 
     fiber_velocity: Vector
@@ -130,9 +140,18 @@ class Energetics:
 def metabolic_constants(
     model: Umberger2010 | Sequence[Umberger2010 | None] | None, law: NDArray[np.int64], params: Vector
 ) -> Vector:
-    """Return the metabolic constants (n, 8) of muscles with laws (n,) and parameters (n, PARAMS).
+    """Return the metabolic constants of n muscles.
 
-    model: one for all muscles, one each, or None for no metabolism. `ModelError` where they are not as many as muscles.
+    Args:
+        model: one metabolic model for all muscles, one for each, or None for no metabolism.
+        law: (n,) codes of the laws, as in the kernels.
+        params: (n, PARAMS) parameters of the muscles, as in the kernels.
+
+    Returns:
+        The constants (n, 8).
+
+    Raises:
+        ModelError: the number of models is not that of the muscles.
     """
     models = [model] * len(law) if model is None or isinstance(model, Umberger2010) else list(model)
     if len(models) != len(law):
@@ -156,11 +175,20 @@ def compute_energetics(
     fiber_length: Vector,
     constants: Vector,
 ) -> Energetics:
-    """Return the energetics of n muscles, in one compiled loop.
+    """Compute the energetics of n muscles, in one compiled loop.
 
-    law (n,) and params (n, PARAMS) as in the kernels; activation, excitation (n,) 0..1; length (n,) [m] and velocity
-    (n,) [m/s] of the units, lengthening positive; fiber_length (n,) [m], read with an elastic tendon only; constants
-    (n, 8) of `metabolic_constants`.
+    Args:
+        law: (n,) codes of the laws, as in the kernels.
+        params: (n, PARAMS) parameters of the muscles, as in the kernels.
+        activation: (n,) 0 to 1.
+        excitation: (n,) 0 to 1.
+        length: (n,) musculotendon lengths [m].
+        velocity: (n,) lengthening speeds [m/s].
+        fiber_length: (n,) [m], used with an elastic tendon only.
+        constants: (n, 8) from `metabolic_constants`.
+
+    Returns:
+        Powers and energies of each muscle.
     """
     out = np.empty((kernel.OUTPUTS, len(law)))
     kernel.energetics(law, params, activation, excitation, length, velocity, fiber_length, constants, out)
@@ -168,7 +196,16 @@ def compute_energetics(
 
 
 def basal_power(body_mass: float, coefficient: float = 1.2, exponent: float = 1.0) -> float:
-    """Return the basal metabolic power of a body [W] from its mass [kg]; 1.2 W/kg: standing (Umberger et al. 2003)."""
+    """Return the basal metabolic power of a body.
+
+    Args:
+        body_mass: [kg].
+        coefficient: [W/kg] if the exponent is 1; 1.2 is for standing (Umberger et al. 2003).
+        exponent: of the mass.
+
+    Returns:
+        The power [W].
+    """
     return coefficient * body_mass**exponent
 
 

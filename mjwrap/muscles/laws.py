@@ -92,11 +92,18 @@ def _fiber_row(law: DeGrooteFregly2016 | Millard2012, least: float) -> tuple[flo
 class DeGrooteFregly2016:
     """The muscle of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9) with pennation, rigid or elastic tendon.
 
-    max_isometric_force [N], optimal_fiber_length [m] > 0; tendon_slack_length [m] >= 0; pennation_angle at optimal
-    fibre length [rad] in [0, pi/2); max_contraction_velocity [optimal lengths/s]; fiber_damping >= 0 [max isometric
-    forces per max contraction velocity], where not given 0 with a rigid tendon and 0.1 with an elastic one, whose fibre
-    then has one velocity at every activation; tendon "rigid" or "elastic", rigid in any case where it is shorter than
-    1e-4 optimal fibre lengths. `ModelError` otherwise.
+    Args:
+        max_isometric_force: [N], positive.
+        optimal_fiber_length: [m], positive.
+        tendon_slack_length: [m], not negative.
+        pennation_angle: at optimal fibre length [rad], in [0, pi/2).
+        max_contraction_velocity: [optimal fibre lengths/s].
+        fiber_damping: not negative [max isometric forces per max contraction velocity]; None for 0 with a rigid tendon
+            and 0.1 with an elastic one, whose fibre then has one velocity at every activation.
+        tendon: "rigid" or "elastic". A tendon shorter than 1e-4 optimal fibre lengths is always rigid.
+
+    Raises:
+        ModelError: a value is not possible.
     """
 
     max_isometric_force: float
@@ -138,8 +145,19 @@ class DeGrooteFregly2016:
 class Millard2012:
     """The damped muscle of Millard et al. 2013 (doi 10.1115/1.4023390, OpenSim's Millard2012EquilibriumMuscle).
 
-    Sizes, tendon and `ModelError` as for `DeGrooteFregly2016`; fiber_damping is 0.1 with either tendon. Curves have
-    OpenSim's default shapes.
+    Curves have OpenSim's default shapes.
+
+    Args:
+        max_isometric_force: [N], positive.
+        optimal_fiber_length: [m], positive.
+        tendon_slack_length: [m], not negative.
+        pennation_angle: at optimal fibre length [rad], in [0, pi/2).
+        max_contraction_velocity: [optimal fibre lengths/s].
+        fiber_damping: not negative [max isometric forces per max contraction velocity], with either tendon.
+        tendon: "rigid" or "elastic". A tendon shorter than 1e-4 optimal fibre lengths is always rigid.
+
+    Raises:
+        ModelError: a value is not possible.
     """
 
     max_isometric_force: float
@@ -182,9 +200,16 @@ _PRM = ("range[0]", "range[1]", "force", "scale", "lmin", "lmax", "vmax", "fpmax
 class MuJoCoMuscle:
     """MuJoCo's own `<muscle>` curves, so that a native model can be compared like for like.
 
-    prm (9,): range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`; length_range (2,)
-    of the actuator [m times gear]; acc0; gear; force_range (2,) [N]; passive (9,): those of the passive force, as in
-    `actuator_biasprm`, where it has its own. `ModelError` where the curves are undefined.
+    Args:
+        prm: (9,) range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`.
+        length_range: (2,) of the actuator [m times gear].
+        acc0: as in `actuator_acc0`.
+        gear: as in `actuator_gear`.
+        force_range: (2,) [N].
+        passive: (9,) the parameters of the passive force, as in `actuator_biasprm`, if it has its own.
+
+    Raises:
+        ModelError: the curves are undefined.
     """
 
     prm: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""One path in space: obstacles with world poses in, a certified geodesic path out; no MuJoCo.
+"""Paths in space without MuJoCo: obstacles with world poses in, a certified geodesic path out.
 
 Everything is in SI units and world coordinates unless it says otherwise.
 """

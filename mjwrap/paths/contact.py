@@ -11,9 +11,13 @@ from mjwrap.paths.scene import Array
 class Contact:
     """Where a path touches one obstacle.
 
-    active: whether it does; P, Q (3,): first and last contact point, world [m] (None where not active);
-    arc_length: of the geodesic from P to Q [m]; second: where the string touches the same surface again, behind a
-    hollow that it bridges (through the air over a torus' hole), else None. A via point is always active, with P = Q.
+    Attributes:
+        active: whether the path touches it. A via point is always active, with P = Q.
+        P: (3,) first contact point, world [m]; None if not active.
+        Q: (3,) last contact point, world [m]; None if not active.
+        arc_length: length of the geodesic from P to Q [m].
+        second: where the path touches the same surface again, behind a hollow that it bridges (through the air over
+            the hole of a torus); None if it does not.
     """
 
     active: bool

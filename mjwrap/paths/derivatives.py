@@ -28,11 +28,15 @@ FAULTS = {
 
 @dataclass(frozen=True)
 class ContactVelocity:
-    """How fast a `Contact` moves; its fields are the rates of those of the contact.
+    """How fast a `Contact` moves; its fields are the rates of the contact's fields.
 
-    active: whether the obstacle is touched; P, Q (3,): velocities of first and last contact point, what the obstacle
-    carries along and what slides on it, world [m/s] (None where not active); arc_length: rate of s [m/s];
-    second: of where the string touches the same surface again.
+    Attributes:
+        active: whether the obstacle is touched.
+        P: (3,) velocity of the first contact point, world [m/s]; None if not active. It is the sum of the obstacle's
+            motion and of sliding on the obstacle.
+        Q: (3,) velocity of the last contact point, likewise.
+        arc_length: rate of the arc length [m/s].
+        second: rates of the second touch of the same surface.
     """
 
     active: bool
@@ -101,8 +105,8 @@ class Derivatives:
     def gradient(self) -> Array:
         """Return ∂l/∂x (n + 2, 6): force [-], then moment about the pose's origin [m], of every slot, world frame.
 
-        Its product with twists is l̇. Tension F pulls with -F times this; `wrenches` has moments about the world origin.
-        Exists, with the geodesic's direction, where a segment vanishes on a surface.
+        Its product with twists is l̇. Tension F pulls with -F times this; `wrenches` has moments about the world
+        origin. Exists, with the geodesic's direction, where a segment vanishes on a surface.
         """
         count, stop = self._stops("gradient", strict=False)
         out = np.zeros((len(self.contacts) + 2, 6))

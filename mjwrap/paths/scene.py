@@ -1,4 +1,4 @@
-"""What a path is laid over: obstacles with world poses, via points, and their rows for the kernels."""
+"""The scene of a path: obstacles with world poses, via points, and their rows for the kernels."""
 
 from __future__ import annotations
 
@@ -38,11 +38,18 @@ def point(value: ArrayLike, what: str) -> Point:
 class Obstacle:
     """A wrapping surface at a pose in the world.
 
-    surface: a `Surface`; pos (3,): origin of its frame [m]; quat (4,): w, x, y, z, any length but zero; hint (3,) or
-    None: a point in the surface's frame [m] near which the path should touch at a cold start. inside: the path is not
-    kept out of the solid but held to it: the shortest one that meets it, with a corner at one point where the straight
-    line does not; only for a sphere or a cylinder of any length, between end points and via points. `GeometryError`
-    for anything else.
+    Args:
+        surface: a `Surface`.
+        pos: (3,) origin of its frame, world [m].
+        quat: (4,) orientation of its frame, w, x, y, z, of any length except zero.
+        hint: (3,) a point in the surface's frame [m] near which the path should touch at a cold start; None for no
+            hint.
+        inside: hold the path to the solid instead of keeping it out: it is the shortest path that meets the solid,
+            with a corner at one point if the straight line does not meet it. Only for a sphere or a cylinder of any
+            length, between end points and via points.
+
+    Raises:
+        GeometryError: a value is not possible.
     """
 
     surface: Surface

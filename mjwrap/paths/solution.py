@@ -1,4 +1,4 @@
-"""The answer of a single solve, and what follows from it: points, speed, wrenches."""
+"""The result of a single solve: length and contacts, and on demand points, speed and wrenches."""
 
 from __future__ import annotations
 
@@ -21,11 +21,18 @@ Ints = NDArray[np.int64]
 
 
 class PathSolution(Derivatives):
-    """The answer of `solve_path`: length, contacts, and on demand points, speed and wrenches.
+    """The result of `solve_path`: length and contacts, and on demand points, speed and wrenches.
 
-    length [m]; status: `Status`; converged: status is CONVERGED; tangency_error: the norm of f over all touched
-    obstacles (30); iterations: Newton steps; evaluations: evaluations of all residuals at once; contacts: one
-    `Contact` per obstacle. Where the path was not found the length is that of the last iterate, never NaN.
+    If no path was found, the length is that of the last iterate, never NaN.
+
+    Attributes:
+        length: length of the path [m].
+        status: a `Status`.
+        converged: whether the status is CONVERGED.
+        tangency_error: norm of the residual f over all touched obstacles (30).
+        iterations: Newton steps.
+        evaluations: evaluations of all residuals at once.
+        contacts: one `Contact` per obstacle and via point.
     """
 
     def __init__(self, origin: Point, insertion: Point, node: Array, owner: Ints, saved: Array) -> None:
@@ -111,10 +118,16 @@ class PathSolution(Derivatives):
     def speed(
         self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None = None
     ) -> float:
-        """Return the lengthening speed l̇ (17) [m/s], positive when the path grows.
+        """Return the lengthening speed l̇ (17), positive when the path gets longer.
 
-        origin_velocity, insertion_velocity (3,) [m/s]; twists (n, 6), one per obstacle or via point: linear velocity of
-        the pose's origin [m/s], then angular velocity [rad/s], world frame; None where nothing moves.
+        Args:
+            origin_velocity: (3,) velocity of the origin, world [m/s].
+            insertion_velocity: (3,) velocity of the insertion, world [m/s].
+            twists: (n, 6), one per obstacle or via point: linear velocity of the pose's origin [m/s], then angular
+                velocity [rad/s], world; None if no obstacle moves.
+
+        Returns:
+            The lengthening speed [m/s].
         """
         pos = np.zeros((len(self._node) + 2, 3))
         pos[0], pos[1:-1], pos[-1] = self._origin, self._node[:, layout.POS : layout.POS + 3], self._insertion

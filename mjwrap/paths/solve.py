@@ -46,13 +46,23 @@ def solve_path(
     tol: float = 1e-10,
     **options: Any,
 ) -> PathSolution:
-    """Find the C1 geodesic path of a taut string from origin to insertion over a row of obstacles.
+    """Find the smooth geodesic path of a taut string from origin to insertion over a row of obstacles.
 
-    origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
-    an earlier solution for the same obstacles elsewhere, or its `branch`: side and winding are kept; tol: largest
-    tangency error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`),
-    which ignore hints and may find a path that winds further than a string would.
-    Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
+    Args:
+        origin: (3,) first point of the path, world [m].
+        insertion: (3,) last point of the path, world [m].
+        obstacles: obstacles and via points in the order in which the path meets them. An obstacle need not be touched.
+        method: "newton", mjwrap's own solver, or one of the paper's: "nr", "bfgs", "broyden" (`mjwrap.methods`). The
+            paper's methods ignore hints and may find a path that winds further than a string would.
+        start: an earlier solution for the same obstacles at other poses, or its `branch`. Side and winding are kept.
+        tol: largest tangency error of a solution.
+        **options: options of the paper's methods.
+
+    Returns:
+        The solution. Check `converged`: if no path was found, `status` says why.
+
+    Raises:
+        GeometryError: the input describes no scene.
     """
     tol = validation.positive(tol, "tol", GeometryError)
     here, there = point(origin, "origin"), point(insertion, "insertion")

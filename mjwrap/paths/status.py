@@ -1,4 +1,4 @@
-"""How the search for a path ends."""
+"""The statuses with which the search for a path ends."""
 
 from __future__ import annotations
 

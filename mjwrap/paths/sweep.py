@@ -18,10 +18,15 @@ from mjwrap.paths.status import Status
 
 @dataclass(frozen=True)
 class SweepSolution:
-    """The answer of `solve_sweep`, one entry per pose.
+    """The result of `solve_sweep`, one entry per pose.
 
-    length (T,) [m]; status (T,): codes of `Status`; tangency_error (T,); iterations, evaluations (T,): what each pose
-    cost; converged: whether every pose did.
+    Attributes:
+        length: (T,) lengths [m].
+        status: (T,) codes of `Status`.
+        tangency_error: (T,) norms of the tangency residuals.
+        iterations: (T,) Newton steps.
+        evaluations: (T,) evaluations of all residuals.
+        converged: whether every pose converged.
     """
 
     length: Array
@@ -57,11 +62,22 @@ def solve_sweep(
     warm: bool = True,
     tol: float = 1e-10,
 ) -> SweepSolution:
-    """Solve a whole motion in one compiled loop.
+    """Solve the path at every pose of a motion, in one compiled loop.
 
-    origin, insertion (T, 3) or (3,): world [m]; obstacles: n surfaces (and via points), whose own poses are not used;
-    pos (T, n, 3), quat (T, n, 4) w, x, y, z: their poses. warm: each pose starts from the ones before and keeps their
-    branch, else each starts cold. Raises `GeometryError` for arrays of other shapes or not finite.
+    Args:
+        origin: (T, 3) or (3,) first point of the path, world [m].
+        insertion: (T, 3) or (3,) last point of the path, world [m].
+        obstacles: n obstacles and via points. Their own poses are not used.
+        pos: (T, n, 3) positions of the obstacles, world [m].
+        quat: (T, n, 4) orientations of the obstacles, w, x, y, z.
+        warm: start each pose from the ones before, and keep their branch; otherwise each pose is a cold start.
+        tol: largest tangency error of a solution.
+
+    Returns:
+        Length, status and cost of every pose.
+
+    Raises:
+        GeometryError: an array has another shape or is not finite.
     """
     tol = validation.positive(tol, "tol", GeometryError)
     n = len(obstacles)

@@ -34,15 +34,26 @@ _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.m
 
 
 def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
-    """Give the muscles of an MjSpec to the engine plugin; return the compiled model, whose `mj_step` runs them.
+    """Give the muscles of an MjSpec to the engine plugin, and compile a model whose `mj_step` runs them.
 
     The spec itself is changed (an instance of the plugin, actuators without force, tendons too thin to be seen), so
-    that it can be compiled again, attached and saved. mode: "wrench" adds the muscles' forces to xfrc_applied;
-    "transmission" gives length, velocity and moment along mjwrap's paths to every actuator on a spatial tendon whose
-    force MuJoCo itself computes (muscles of other laws act by wrenches). keep_tendons: let MuJoCo go on computing the
-    tendons that only say where a muscle runs; else the returned model leaves out those that nothing else needs. The
-    plugin draws the muscles. Raises `ModelError` where its muscles cannot be read, or a moment has no room;
-    `VersionError` where MuJoCo is unknown; the spec is then as it was.
+    that it can be compiled again, attached and saved. The plugin draws the muscles. If an error is raised, the spec
+    is as it was.
+
+    Args:
+        spec: the model.
+        mode: "wrench" adds the muscles' forces to xfrc_applied. "transmission" gives length, velocity and moment along
+            mjwrap's paths to every actuator on a spatial tendon whose force MuJoCo itself computes; muscles of other
+            laws act by wrenches.
+        keep_tendons: keep tendons that are only there for the route of a muscle, so that MuJoCo computes them;
+            otherwise the returned model leaves out those that nothing else needs.
+
+    Returns:
+        The compiled model.
+
+    Raises:
+        ModelError: the muscles cannot be read, or a moment has no room for all bodies of its path.
+        VersionError: this MuJoCo is unknown.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
@@ -118,7 +129,17 @@ def load(
 ) -> mujoco.MjModel:
     """Load an MJCF file with its muscles in the engine plugin (`install`), or an MJB file of a model that has it.
 
-    mode: "wrench" if None; an MJB file has one of its own, and another is a `ModelError`. keep_tendons: of MJCF files.
+    Args:
+        path: the file.
+        mode: as in `install`; "wrench" if None. An MJB file has its own mode.
+        keep_tendons: as in `install`; for MJCF files.
+
+    Returns:
+        The compiled model.
+
+    Raises:
+        ModelError: as in `install`, or the file cannot be loaded, or an MJB file has another mode.
+        VersionError: this MuJoCo is unknown.
     """
     register()
     model = read_model(path)

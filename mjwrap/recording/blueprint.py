@@ -1,4 +1,4 @@
-"""What the viewer opens with: the model in 3D beside the muscles' curves, by group where there are many muscles."""
+"""The layout of the viewer: the model in 3D beside the muscles' curves, in groups if there are many muscles."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple

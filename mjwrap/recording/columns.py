@@ -1,4 +1,5 @@
-"""Columns of a recording: NumPy rows gathered during the run, turned into Arrow columns a few hundred at once."""
+"""Columns of a recording: NumPy rows are gathered during the run and turned into Arrow columns a few hundred at
+once."""
 
 from collections.abc import Iterable, Sequence
 from functools import cache

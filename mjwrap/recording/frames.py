@@ -1,4 +1,4 @@
-"""Rows of a recording between two flushes: one of scalars a state, one of poses, paths and forces a displayed frame."""
+"""Rows of a recording between two flushes: scalars for each state; poses, paths and forces for each displayed frame."""
 
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple

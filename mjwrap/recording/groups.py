@@ -1,4 +1,4 @@
-"""Which muscles stand together in a recording: groups, given or by the body they move, and the joints they cross."""
+"""Groups of muscles in a recording, given or by the body that they move, and the joints that they cross."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings once they are there: what one holds, and the viewer on it."""
+"""Existing recordings: a summary of the contents, and the viewer."""
 
 import contextlib
 import os

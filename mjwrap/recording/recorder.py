@@ -1,4 +1,4 @@
-"""`Recorder`: what happened in a run, as a file that the rerun viewer replays."""
+"""`Recorder`: writes a run into a file that the rerun viewer plays."""
 
 import math
 import numbers
@@ -24,26 +24,31 @@ LIVE = 0.2  # seconds by the clock between two batches to a running viewer
 
 
 class Recorder(RunLog):
-    """Record a simulation for rerun: the moving model, muscle paths coloured by activation, forces, and time series.
+    """Record a simulation for rerun: the moving model, muscle paths coloured by activation, forces, and curves.
 
-    `model` is a mujoco.MjModel; `muscles` its MuscleSystem, or `mjwrap.plugin.Muscles` of the data that a model with
-    the engine plugin moves; `path` a file name that ends in .rrd. `connect` streams to a running viewer, beside the
-    file or instead of it: True to one on this machine, or an address (rerun+http://HOST:PORT/proxy).
+    The curves are length [m], lengthening speed [m/s], tension [N], activation, power [W], fibre length [m], solver
+    status and iterations of every muscle. The file gets its name only when it is complete: at `close`, or at the end
+    of a `with` block, also if Ctrl-C ended it. After an error inside the block no file is left, and an existing file
+    of that name stays as it was.
 
-    `rate` [Hz] states per second of simulated time are recorded, beside those of frames (None: one at every `log`):
-    length [m], lengthening speed [m/s], tension [N], activation, power [W], fibre length [m], solver status and
-    iterations of every muscle.
-    Bodies, paths, contact points, forces and moment arms are taken `path_rate` times [Hz]. `groups` says whose curves
-    stand together, {name: patterns of muscle names} (None: by the body that they move). `force_scale` [m/N] is the
-    length of an arrow (None: the strongest muscle's is three tenths of the size of all paths). `flush_every` states are
-    gathered before they go to the file (None: 4000, fewer where there are many muscles); `spacing` [m] is the distance
-    of points on the curved parts of a path (None: as many as their curvature asks for).
+    Args:
+        model: a mujoco.MjModel.
+        muscles: its MuscleSystem, or `mjwrap.plugin.Muscles` of the data that a model with the engine plugin moves.
+        path: a file name that ends in .rrd; None with `connect`.
+        connect: stream to a running viewer, besides the file or instead of it: True for one on this machine, or an
+            address (rerun+http://HOST:PORT/proxy).
+        rate: states per second of simulated time in the curves [Hz], besides those of frames; None for one at every
+            `log`.
+        path_rate: frames per second of simulated time [Hz] of bodies, paths, contact points, forces and moment arms.
+        groups: whose curves are shown together, {name: patterns of muscle names}; None to group muscles by the body
+            that they move.
+        force_scale: length of an arrow [m/N]; None: the strongest muscle's is three tenths of the size of all paths.
+        flush_every: states that are gathered before they go to the file; None for 4000, fewer with many muscles.
+        spacing: largest distance of points on the curved parts of a path [m]; None to choose it from the curvature.
 
-    The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
-    Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
-
-    Raises RecordingError, before the run where `path` cannot be written or no viewer listens, and from `log` or
-    `close` where the disk is full, or the viewer is gone and there is no file.
+    Raises:
+        RecordingError: before the run, if the file cannot be written or no viewer listens; from `log` or `close`, if
+            the disk is full, or the viewer is gone and there is no file.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Names and static contents of a recording: which entity stands for which body, geom, site and muscle."""
+"""Names and static contents of a recording: the entities of bodies, geoms, sites and muscles."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""The still part of a recording: every geom of a MuJoCo model, and every wrapping surface, as a rerun shape."""
+"""The static part of a recording: every geom of a MuJoCo model, and every wrapping surface, as a rerun shape."""
 
 from typing import Any
 

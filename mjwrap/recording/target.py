@@ -1,4 +1,4 @@
-"""How a recording gets into its file where the disk may fill up."""
+"""Writing a recording into its file, with errors when the disk is full."""
 
 import os
 import selectors

@@ -178,9 +178,15 @@ class Torus(Surface):
 class Cone(Surface):
     """A circular cone about local z, or a tapered cylinder.
 
-    bottom_radius, top_radius [m]: at z = -half_length and z = half_length, not negative and not equal (the slope at
-    least 1e-3: use `Cylinder` instead); half_length [m], finite and positive: a range of validity, as of `Cylinder`,
-    that never reaches beyond the apex. `GeometryError` for other sizes.
+    Args:
+        bottom_radius: radius at z = -half_length [m], not negative.
+        top_radius: radius at z = half_length [m], not negative and not equal to the other (the slope is at least 1e-3:
+            use `Cylinder` instead).
+        half_length: [m], finite and positive: a range of validity, as for `Cylinder`, that never reaches beyond the
+            apex.
+
+    Raises:
+        GeometryError: a size is not possible.
     """
 
     bottom_radius: float

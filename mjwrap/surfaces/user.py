@@ -70,17 +70,21 @@ def _restored(kind: type[CustomSurface], label: str, key: str, generator: str, t
 class ParametricSurface(CustomSurface):
     """A surface given as a point r for two parameters u and v.
 
-    r: a plain Python function of two numbers that returns the tuple (x, y, z) [m], or its source text. It may use
-    `math`, numbers from around it and other such functions.
-    u_range, v_range: (lowest, highest). A range that does not close on itself is a range of validity: a path beyond it
-    is found where r goes on there, and reported as `OUT_OF_RANGE`.
-    periodic: whether each range closes on itself; None: found from the shape.
-    derivatives: a function of (u, v) that returns (r_u, r_v, r_uu, r_uv, r_vv), three numbers each; None: derived with
-    sympy, which an r with branches does not allow.
-    outward: 1 where the outward normal is along r_u x r_v, -1 where against it; None: away from the surface's middle.
-    size: about the smallest radius of curvature [m]; None: found from the shape.
-    name: for messages.
-    `GeometryError` where r is not smooth and regular (r_u x r_v = 0, as at a pole) or cannot be compiled.
+    Args:
+        r: a plain Python function of two numbers that returns the tuple (x, y, z) [m], or its source text. It may use
+            `math`, numbers from around it and other such functions.
+        u_range: (lowest, highest). A range that does not close on itself is a range of validity: a path beyond it is
+            found if r continues there, and reported as `OUT_OF_RANGE`.
+        v_range: the same for v.
+        periodic: whether each range closes on itself; None to find it from the shape.
+        derivatives: a function of (u, v) that returns (r_u, r_v, r_uu, r_uv, r_vv), three numbers each; None to derive
+            them with SymPy, which cannot handle branches.
+        outward: 1 if the outward normal is along r_u x r_v, -1 if against it; None: away from the surface's middle.
+        size: about the smallest radius of curvature [m]; None to find it from the shape.
+        name: for messages.
+
+    Raises:
+        GeometryError: r is not smooth and regular (r_u x r_v = 0, as at a pole), or cannot be compiled.
     """
 
     def __init__(
@@ -110,16 +114,21 @@ class ParametricSurface(CustomSurface):
 class ImplicitSurface(CustomSurface):
     """A surface given as the points where a function phi is zero.
 
-    phi: a plain Python function of three numbers x, y, z [m] that is negative inside and positive outside, or its
-    source text. It may use `math`, numbers from around it and other such functions.
-    extent: half width of a box about the origin, or three along x, y, z [m]. The surface is looked at, and valid,
-    within it: a path beyond is reported as `OUT_OF_RANGE`. The box should hold the surface and hardly more.
-    gradient: a function of (x, y, z) that returns (phi_x, phi_y, phi_z); hessian: one that returns
-    ((phi_xx, phi_xy, phi_xz), (phi_xy, phi_yy, phi_yz), (phi_xz, phi_yz, phi_zz)), with `gradient` only. None: derived
-    with sympy, which branches do not allow.
-    size: about the smallest radius of curvature [m]; None: found from the shape.
-    name: for messages.
-    `GeometryError` where phi is not smooth, its gradient vanishes on the surface, or it cannot be compiled.
+    Args:
+        phi: a plain Python function of three numbers x, y, z [m] that is negative inside and positive outside, or its
+            source text. It may use `math`, numbers from around it and other such functions.
+        extent: half width of a box about the origin, or three half widths along x, y, z [m]. The box should contain the
+            surface and be hardly larger. The surface is sampled and valid within it: a path beyond it is reported as
+            `OUT_OF_RANGE`.
+        gradient: a function of (x, y, z) that returns (phi_x, phi_y, phi_z); None to derive it with SymPy, which cannot
+            handle branches.
+        hessian: a function of (x, y, z) that returns
+            ((phi_xx, phi_xy, phi_xz), (phi_xy, phi_yy, phi_yz), (phi_xz, phi_yz, phi_zz)), with `gradient` only.
+        size: about the smallest radius of curvature [m]; None to find it from the shape.
+        name: for messages.
+
+    Raises:
+        GeometryError: phi is not smooth, its gradient vanishes on the surface, or it cannot be compiled.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
-"""Geodesics of every shape with their Jacobi fields, by other means than the package's.
+"""Geodesics of every shape with their Jacobi fields, with methods other than the package's.
 
-Closed forms where the surface unrolls or is round; elsewhere Gauss-Legendre collocation of p'' = -(t.Ht /
+Closed forms if the surface can be unrolled or is round; otherwise Gauss-Legendre collocation of p'' = -(t.Ht /
 |g|^2) g in the embedding space (g, H: gradient and Hessian of the defining function), for a thousand arcs at
-once. `slow_arc` integrates the same equation with SciPy's DOP853, one arc at a time, and judges both.
+once. `slow_arc` integrates the same equation with SciPy's DOP853, one arc at a time, to test both.
 """
 
 from __future__ import annotations

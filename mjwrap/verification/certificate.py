@@ -1,8 +1,9 @@
-"""The judge of paths: what a solution claims, tested from its contact points and arc lengths alone.
+"""An independent judge of paths: tests a solution from its contact points and arc lengths alone.
 
-A path of a taut string touches each of its surfaces along a geodesic that bends towards the surface everywhere,
-meets and leaves it tangentially, enters no surface in whose turn it lies, and is a local minimum of length.
-`findings` tests a thousand paths at once, by the geometry of `shapes` and the geodesics of `arcs`.
+The path of a taut string touches each of its surfaces along a geodesic that bends towards the surface everywhere. It
+meets and leaves the surface tangentially, does not enter a surface between whose neighbours it lies, and is a local
+minimum of length. `findings` tests a thousand paths at once, with the geometry of `shapes` and the geodesics of
+`arcs`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every taut path over one surface: closed forms where it unrolls or is round, else rays shot from one end point.
+"""All taut paths over one surface: closed forms if it can be unrolled or is round, else rays shot from one end point.
 
 A path over one surface starts along a ray from the origin that grazes the surface. Those rays are a family with
 one parameter: a hundred of them are taken, each is continued along its geodesic, and along each geodesic the

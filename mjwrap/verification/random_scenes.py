@@ -1,8 +1,8 @@
 """Seeded random scenes at muscle scale for robustness.py and motion.py, each with a hint of every kind.
 
-Half of them are made backwards: a geodesic that a string can lie on is drawn first, on every surface in turn,
+Half of them are constructed backwards: a geodesic on which a string can lie is drawn first, on every surface,
 and the ends are put on its tangents. So one taut path is known in advance, its middle is a good hint, and its
-length bounds the shortest. The other half are placed at random (`scenes.py`), as obstacles happen to lie,
+length bounds the shortest. The other half are placed at random (`scenes.py`)
 and have no good hint.
 """
 

@@ -1,4 +1,4 @@
-"""Scenes for the path tests, and geometry written without any of the package's kernels."""
+"""Scenes for the path tests, and geometry written without the package's kernels."""
 
 from __future__ import annotations
 

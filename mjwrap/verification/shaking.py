@@ -1,11 +1,9 @@
-"""The second derivative of a path's length by shaking it.
+"""The second derivative of a path's length, measured by perturbing the path.
 
-Contact points are shifted sideways on their surfaces, geodesics between them are found anew, and lengths are
-measured.
-
-Nothing here knows the theory of Jacobi fields by which `certificate.stiffness` (and the solver) tell a minimum
-from a saddle. It costs a few hundred geodesics, so it serves tests, and a random share of the scenes of
-robustness.py.
+Contact points are shifted sideways on their surfaces, geodesics between them are computed again, and lengths are
+measured. Nothing here uses the theory of Jacobi fields, with which `certificate.stiffness` and the solver distinguish
+a minimum from a saddle. It costs a few hundred geodesics, so it is used in tests, and for a random share of the scenes
+of robustness.py.
 """
 
 from __future__ import annotations

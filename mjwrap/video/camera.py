@@ -1,4 +1,4 @@
-"""Where a film is seen from: a camera of the model, MuJoCo's free camera, or one that looks at the muscles."""
+"""Cameras of films: one of the model, MuJoCo's free camera, or one that looks at the muscles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Video`: a simulation as a film, at simulation time."""
+"""`Video`: films a simulation at simulation time."""
 
 from __future__ import annotations
 
@@ -19,19 +19,26 @@ EARLY = 1e-6  # part of a frame's period by which it may come too early, for tim
 
 
 class Video(RunLog):
-    """Film a simulation: what MuJoCo's renderer shows of it, as an .mp4 or .gif.
+    """Film a simulation as MuJoCo's renderer shows it, into an .mp4 or .gif file.
 
-    `model` is a mujoco.MjModel; the muscles of one that `install` or `load` returned are in the picture. `path` is a
-    file name that ends in .mp4 or .gif, `fps` the frames per second of the film, `speed` how many simulated seconds
-    pass in one of its seconds. `width` and `height` are in pixels. `camera` is the name or id of a camera of the
-    model, "muscles" for one that looks at all muscles where the film begins, a mujoco.MjvCamera, or None for MuJoCo's
-    free camera on the whole model; `option` is a mujoco.MjvOption.
+    Muscles of a model that `install` or `load` returned are shown. The file gets its name only when it is complete: at
+    `close`, or at the end of a `with` block, also if Ctrl-C ended it. After an error inside the block no file is
+    left, and an existing file of that name stays as it was.
 
-    The file has its name only once it is complete: `close` does that, or the end of a `with` block, also where
-    Ctrl-C ended it. An error inside the block leaves nothing behind, and an older file of that name as it was.
+    Args:
+        model: a mujoco.MjModel.
+        path: a file name that ends in .mp4 or .gif.
+        fps: frames per second of the film.
+        speed: simulated seconds per second of the film.
+        width: of a frame [pixels].
+        height: of a frame [pixels].
+        camera: name or id of a camera of the model, "muscles" for one that looks at all muscles where the film
+            begins, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model.
+        option: a mujoco.MjvOption: what is shown.
 
-    Raises RecordingError, before the run, where no OpenGL works, `path` cannot be written or what writes it is not
-    installed; from `log` or `close` where the disk is full.
+    Raises:
+        RecordingError: before the run, if no OpenGL works, the file cannot be written, or the package that writes it
+            is not installed; from `log` or `close`, if the disk is full.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Frames into a file: MP4 through PyAV, GIF through Pillow, each loaded when it is asked for."""
+"""Writing frames into a file: MP4 with PyAV, GIF with Pillow; each is loaded only when needed."""
 
 from __future__ import annotations
 

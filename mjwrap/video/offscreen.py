@@ -1,4 +1,4 @@
-"""Pictures of a model without a window: MuJoCo's renderer on whatever OpenGL works here."""
+"""Pictures of a model without a window, with MuJoCo's renderer on any OpenGL that works."""
 
 from __future__ import annotations
 
