@@ -13,6 +13,7 @@ from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.musculotendon import dynamics, tension
 from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
 from mjwrap.muscles.laws import ActuatorForce
+from mjwrap.surfaces.rows import surface_rows
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -79,20 +80,12 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 
 
 def kernel_rows(node: Node) -> list[Array]:
-    """Return the kernels' rows of a stop, cold: one, or two for a surface that a string may touch twice."""
+    """Return the kernels' rows of a stop, cold: one, or several for a surface that a string may touch several times."""
+    if node.surface is not None:
+        return list(surface_rows(node.surface, node.inside))
     row = np.zeros(layout.ROW)
-    row[layout.S_MODE] = layout.COLD
-    if node.surface is None:
-        return [row]
-    dims = node.surface.dims
-    row[layout.KIND], row[layout.SIZE] = node.surface.kind, node.surface.size
-    row[layout.DIM : layout.DIM + len(dims)] = dims
-    row[layout.INSIDE] = float(node.inside)
-    if not node.surface.hollow:
-        return [row]
-    twin = row.copy()
-    twin[layout.TWIN] = 1.0
-    return [row, twin]
+    row[layout.KIND], row[layout.S_MODE] = layout.VIA, layout.COLD
+    return [row]
 
 
 def last_dofs(model: mujoco.MjModel) -> Ints:
