@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
-from mjwrap.kernels.musculotendon import dynamics, tension
+from mjwrap.kernels.musculotendon import dynamics, table
 from mjwrap.mjcf import EARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
-from mjwrap.muscles.laws import ActuatorForce
+from mjwrap.muscles.laws import ActuatorForce, parameter_row
 from mjwrap.surfaces.rows import surface_rows
 
 Array = NDArray[np.float64]
@@ -118,7 +118,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
             routes.append((first, len(links), route.origin, route.insertion, *bodies, m, surfaces))
             weights.append(route.weight)
     n = len(muscles)
-    params = np.zeros((n, tension.PARAMS))
     outputs = [
         int(model.actuator_outadr[m.actuator]) if isinstance(m.parameters, ActuatorForce) else -1
         for m in muscles
@@ -127,9 +126,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
     activations = [
         _activation(model, declared, source[0]) for declared, source in zip(muscles, sources, strict=True)
     ]
-    for m, declared in enumerate(muscles):
-        values = declared.parameters.row()
-        params[m, : len(values)] = values
     return Plan(
         n=n,
         node=np.array(rows).reshape(-1, layout.ROW),
@@ -137,7 +133,7 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         routes=np.array(routes, dtype=np.int64).reshape(-1, muscle_paths.ROUTE),
         weights=np.array(weights, dtype=np.float64),
         law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
-        params=params,
+        params=np.array([parameter_row(m.parameters) for m in muscles]).reshape(n, table.PARAMS),
         source=np.array([s[0] for s in sources], dtype=np.int64),
         index=np.array([s[1] for s in sources], dtype=np.int64),
         control=np.array([s[2] for s in sources], dtype=np.int64),

@@ -10,7 +10,7 @@ from mjwrap.kernels.coupling.evaluation import evaluate
 from mjwrap.kernels.coupling.muscle_paths import ROUTE
 from mjwrap.kernels.coupling.wrenches import body_wrenches, put, take_back
 from mjwrap.kernels.musculotendon.dynamics import TIMES, write_states
-from mjwrap.kernels.musculotendon.tension import PARAMS
+from mjwrap.kernels.musculotendon.table import PARAMS
 from mjwrap.kernels.solved import segments as sg
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
