@@ -22,9 +22,8 @@ PARAMS = 21  # columns of the table of parameters
 
 WITH_FIBER = (DEGROOTE_FREGLY, MILLARD)
 WITHOUT_FIBER = (PATH_ACTUATOR, MUJOCO)
-EXPONENTIAL_TENDON = (
-    DEGROOTE_FREGLY,
-)  # whose tendon's curve is one: the search for a balance takes its logarithm
+# whose tendon's curve is an exponential: the search for a balance takes its logarithm
+EXPONENTIAL_TENDON = (DEGROOTE_FREGLY,)
 NAN = math.nan
 
 
