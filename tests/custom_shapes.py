@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import user_surface
+from mjwrap.surfaces.rows import write_surface
 from mjwrap.surfaces.user import CustomSurface, ImplicitSurface, ParametricSurface
 
 Array = NDArray[np.float64]
@@ -117,9 +118,7 @@ MAKERS: dict[str, Callable[[], CustomSurface]] = {
 
 def place(surface: CustomSurface, node: Array) -> Array:
     """Write a surface to all rows."""
-    node[:, lay.KIND] = surface.kind
-    node[:, lay.DIM : lay.DIM + 4] = surface.dims
-    node[:, lay.SIZE] = surface.size
+    write_surface(surface, node)
     return node
 
 

@@ -10,7 +10,7 @@ import pytest
 from mjcf_reading import Vector
 
 import mjwrap as mw
-from mjwrap.kernels.musculotendon import tension
+from mjwrap.muscles.laws import parameter_row
 
 HILL = Path(__file__).resolve().parents[2] / "shared" / "reference" / "hill"
 SIZES = {
@@ -44,10 +44,7 @@ def elastic(name: str, sizes: str, damping: float) -> FiberLaw:
 
 def row(*laws: mw.DeGrooteFregly2016 | mw.Millard2012 | mw.PathActuator) -> Vector:
     """Return the kernels' parameters of muscles, a row each."""
-    params = np.zeros((len(laws), tension.PARAMS))
-    for i, law in enumerate(laws):
-        params[i, : len(law.row())] = law.row()
-    return params
+    return np.array([parameter_row(law) for law in laws])
 
 
 def values(curve: object, at: Vector) -> Vector:

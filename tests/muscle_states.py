@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 import mjwrap as mw
-from mjwrap.kernels.musculotendon import tension as muscle_kernel
 from mjwrap.muscles.energetics import Energetics, compute_energetics, metabolic_constants
+from mjwrap.muscles.laws import parameter_row
 
 Vector = NDArray[np.float64]
 EACH_LAW = pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])
@@ -23,10 +23,7 @@ SIZES = {  # F_max [N], l_o [m], l_s [m], pennation [rad]
 
 def rows(laws: list[Any]) -> tuple[NDArray[np.int64], Vector]:
     """Laws as the kernels read them: codes (n,) and parameters (n, PARAMS)."""
-    params = np.zeros((len(laws), muscle_kernel.PARAMS))
-    for m, law in enumerate(laws):
-        params[m, : len(law.row())] = law.row()
-    return np.array([law.code for law in laws]), params
+    return np.array([law.code for law in laws]), np.array([parameter_row(law) for law in laws])
 
 
 def evaluate(

@@ -31,6 +31,7 @@ import mjwrap as mw
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import geodesics, user_surface
 from mjwrap.surfaces.codegen.lanes import cosine, sine
+from mjwrap.surfaces.rows import write_surface
 from mjwrap.surfaces.user import CustomSurface, ImplicitSurface, ParametricSurface
 
 CASES = 30
@@ -273,7 +274,7 @@ def test_leaving_the_range_of_validity_is_noticed(make: Callable[[], CustomSurfa
     for arc, left in ((0.01, False), (0.02, True), (-0.2, False)):
         node[0, lay.S_ARC] = arc
         user_surface.custom_geodesic(0, node)
-        assert node[0, lay.W_ANGLE] == float(left)
+        assert node[0, lay.W_OUT] == float(left)
         assert node[0, lay.W_Q + 2] == pytest.approx(0.19 + 0.8 * arc, abs=1e-14)  # found all the same
 
 
@@ -289,8 +290,7 @@ def test_a_geodesic_that_never_ends_is_given_up() -> None:
 def built_in(surface: mw.Sphere | mw.Cylinder | mw.Ellipsoid | mw.Torus, node: Array) -> Array:
     """Return rows for a built-in surface with the same geodesics."""
     node = node.copy()
-    node[:, lay.KIND] = surface.kind
-    node[:, lay.DIM : lay.DIM + len(surface.dims)] = surface.dims
+    write_surface(surface, node)
     for k in range(len(node)):
         geodesics.geodesic(k, node, 0.0, 0.0, 0.0)
     return node
@@ -329,7 +329,7 @@ def test_chart_and_level_set_of_one_ellipsoid_agree() -> None:
     node = random_rows(ImplicitSurface(ellipsoid, (0.06, 0.04, 0.03)), 300, np.random.default_rng(16))
     other = place(chart, node.copy())
     followed(other)
-    within = [k for k in range(len(node)) if other[k, lay.W_ANGLE] == 0.0]
+    within = [k for k in range(len(node)) if other[k, lay.W_OUT] == 0.0]
     assert len(within) > 150
     same(followed(node)[within], other[within], min(RADII))
 

@@ -13,7 +13,7 @@ from derivative_scenes import SURFACES, Array, exponential
 
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.geometry import geodesics
+from mjwrap.kernels.geometry import geodesics, table
 from mjwrap.kernels.solved import hessian
 from mjwrap.kernels.tangency import newton
 from mjwrap.paths.scene import pack
@@ -77,7 +77,7 @@ def start(rng: np.random.Generator, surface: mw.Sphere | mw.Torus, row: Array) -
         near += surface.minor_radius * rng.normal(size=3)
     elif isinstance(surface, mw.Cone):
         near[2] = rng.uniform(-0.02, 0.02)
-    found = np.array(geodesics.project(row[None, :], 0, *near))
+    found = np.array(table.project(row[None, :], 0, *near))
     tangent = np.cross(found[3:], rng.normal(size=3))
     return found[:3], tangent / np.linalg.norm(tangent), found[3:]
 
@@ -86,7 +86,7 @@ def lay_path(rng: np.random.Generator, kinds: str) -> Laid:
     """Return a random path over one obstacle per letter of `SURFACES`, curved towards the string at both contacts."""
     surfaces = [SURFACES[letter](rng) for letter in kinds]
     node = pack([mw.Obstacle(surface) for surface in surfaces])
-    node = node[node[:, lay.TWIN] == 0.0]  # no surface twice
+    node = node[node[:, lay.TOUCH] == 0.0]  # no surface twice
     node[:, lay.S_MODE] = lay.TOUCHED
     here, heading = np.zeros(3), np.array([1.0, 0.0, 0.0])
     for surface, row in zip(surfaces, node, strict=True):

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import geodesics
-from mjwrap.kernels.geometry.projection import height, project
+from mjwrap.kernels.geometry.table import height, project
 from mjwrap.surfaces import Surface
+from mjwrap.surfaces.rows import write_surface
 
 Array = NDArray[np.float64]
 Variation = tuple[float, float, float, float]
@@ -50,9 +51,7 @@ def row(make: Callable[[np.random.Generator], Surface], rng: np.random.Generator
     """Return a node with a random surface, pose and geodesic on it."""
     surface = make(rng)
     node = np.zeros((1, lay.ROW))
-    node[0, lay.KIND] = surface.kind
-    node[0, lay.DIM : lay.DIM + len(surface.dims)] = surface.dims
-    node[0, lay.SIZE] = surface.size
+    write_surface(surface, node)
     node[0, lay.POS : lay.POS + 3] = rng.normal(size=3) * 0.1
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))

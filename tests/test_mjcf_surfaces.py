@@ -25,8 +25,8 @@ CORNERS = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.1, 0.1) for z in (-0.2,
 # A numeric's name and data, and the surface that they declare with its kind and sizes for the kernels.
 DECLARED: dict[str, tuple[str, Any, int, list[float], float]] = {
     "sphere": ("sphere_size", mw.Sphere(0.03), layout.SPHERE, [0.03], 0.03),
-    "cylinder": ("cylinder_size", mw.Cylinder(0.03), layout.CYLINDER, [0.03, math.inf], 0.03),
-    "short cylinder": ("cylinder_size", mw.Cylinder(0.03, 0.05), layout.CYLINDER, [0.03, 0.05], 0.03),
+    "cylinder": ("cylinder_size", mw.Cylinder(0.03), layout.CYLINDER, [0.03], 0.03),
+    "short cylinder": ("cylinder_size", mw.Cylinder(0.03, 0.05), layout.CYLINDER, [0.03], 0.03),
     "ellipsoid": (
         "ellipsoid_size", mw.Ellipsoid((0.03, 0.02, 0.05)), layout.ELLIPSOID, [0.03, 0.02, 0.05], 0.02,
     ),
@@ -36,12 +36,13 @@ DECLARED: dict[str, tuple[str, Any, int, list[float], float]] = {
     ),
     "short elliptic cylinder": (
         "elliptic_cylinder_size", mw.EllipticCylinder((0.02, 0.03), 0.05), layout.ELLIPTIC_CYLINDER,
-        [0.02, 0.03, 0.05], 0.02,
+        [0.02, 0.03, math.inf], 0.02,
     ),
     "torus": ("torus_size", mw.Torus(0.04, 0.01), layout.TORUS, [0.04, 0.01], 0.01),
-    "cone": ("cone_size", mw.Cone(0.03, 0.01, 0.05), layout.CONE, [0.02, -0.2, 0.05], 0.02),
+    "cone": ("cone_size", mw.Cone(0.03, 0.01, 0.05), layout.CONE, [0.02, -0.2], 0.02),
     "capsule": ("capsule_size", mw.Capsule(0.02, 0.05), layout.CAPSULE, [0.02, 0.05], 0.02),
 }  # fmt: skip
+LIMITS = {"short cylinder": 0.05, "short elliptic cylinder": 0.05, "cone": 0.05}  # how far along z it exists
 DATA = {
     "sphere": "0.03",
     "cylinder": "0.03",
@@ -144,15 +145,16 @@ def test_the_plan_has_the_kernels_kind_and_sizes(case: str) -> None:
     assert row[layout.KIND] == kind
     assert row[layout.DIM : layout.DIM + len(dims)] == pytest.approx(dims, rel=1e-15)
     assert row[layout.SIZE] == size
+    assert row[layout.Z_LIMIT] == LIMITS.get(case, math.inf)
     assert row[layout.S_MODE] == via[layout.S_MODE] == layout.COLD
     assert via[layout.KIND] == layout.VIA
     assert plan.links[0, 1] == model.geom("crate").id
     assert plan.links[-1, 0] == model.site("via").id
-    assert [other[layout.TWIN] for other in rows] == ([0.0, 1.0] if case == "torus" else [0.0])
+    assert [other[layout.TOUCH] for other in rows] == ([0.0, 1.0] if case == "torus" else [0.0])
     hints = plan.links[:, 2].tolist()
     assert hints == [model.site("elbow_side").id] + [-1] * len(rows)  # of the first row only
     for other in rows:
-        assert (other[: layout.TWIN] == row[: layout.TWIN]).all()
+        assert (other[: layout.TOUCH] == row[: layout.TOUCH]).all()
 
 
 def test_plans_of_native_muscles_are_as_before() -> None:
@@ -160,7 +162,8 @@ def test_plans_of_native_muscles_are_as_before() -> None:
     plan = build_plan(model, read_declarations(model).muscles)
     kinds = [layout.CYLINDER, layout.VIA, layout.VIA, layout.SPHERE]
     assert plan.node[:, layout.KIND].tolist() == kinds
-    assert plan.node[0, layout.DIM : layout.SIZE + 1].tolist() == [0.025, math.inf, 0, 0, 0.025]
+    assert plan.node[0, layout.DIM : layout.SIZE + 1].tolist() == [0.025, 0, 0, 0, 0.025]
+    assert plan.node[0, layout.Z_LIMIT] == math.inf
     assert plan.node[3, [layout.DIM, layout.SIZE]].tolist() == [0.015, 0.015]
 
 

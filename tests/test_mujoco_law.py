@@ -10,6 +10,7 @@ import pytest
 
 import mjwrap as mw
 from mjwrap.kernels.musculotendon import tension as muscle
+from mjwrap.muscles.laws import parameter_row
 
 ROUNDING = 1e-13  # relative to the largest force of the muscle: a dozen operations, some fused
 PRM = (0.75, 1.05, 400.0, 200.0, 0.5, 1.6, 1.5, 1.3, 1.2)
@@ -32,8 +33,7 @@ def random_prm(rng: np.random.Generator) -> tuple[float, ...]:
 
 
 def tension(law: mw.MuJoCoMuscle, a: float, length: float, speed: float) -> float:
-    params = np.zeros((1, muscle.PARAMS))
-    params[0, : len(law.row())] = law.row()
+    params = np.array([parameter_row(law)])
     return muscle.tension(law.code, params, 0, a, length, speed)
 
 

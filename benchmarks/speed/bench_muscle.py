@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 import mjwrap as mw
 from mjwrap.kernels.musculotendon import activation_dynamics, equilibrium, fiber
 from mjwrap.kernels.musculotendon import tension as muscle
+from mjwrap.muscles.laws import parameter_row
 
 KINDS = {  # F_max [N], l_o [m], l_s [m], pennation [rad]
     "short tendon": (600.0, 0.12, 0.03, 0.14),
@@ -67,12 +68,11 @@ def declare(law: str, tendon: str, sizes: tuple[float, float, float, float]) -> 
 def prepare(law: str, tendon: str, step: float) -> Motion:
     """Return the motion of a law's muscles at steps of a duration [s]."""
     laws = [declare(law, tendon, sizes) for sizes in KINDS.values() for _ in range(PHASES)]
-    params = np.zeros((len(laws), muscle.PARAMS))
+    params = np.array([parameter_row(law) for law in laws])
     time = np.arange(STEPS + 1) * step
     signals = np.zeros((STEPS + 1, 4, len(laws)))
     start = np.zeros(len(laws))
     for m, (_, optimal, slack, pennation) in enumerate(s for s in KINDS.values() for _ in range(PHASES)):
-        params[m, : len(laws[m].row())] = laws[m].row()
         phase = 2.0 * np.pi * (m % PHASES) / PHASES
         along = optimal * (0.95 * np.cos(pennation) + 0.25 * np.sin(3.0 * np.pi * time + phase))
         excitation = np.where(np.sin(5.0 * np.pi * time + 2.0 * phase) > 0.0, 0.9, 0.05)

@@ -22,6 +22,7 @@ import mjwrap as mw
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import geodesics
 from mjwrap.kernels.spans.chain import set_rotation
+from mjwrap.surfaces.rows import write_surface
 
 RADII = 0.05, 0.035, 0.025
 RING, TUBE = 0.04, 0.012
@@ -64,9 +65,7 @@ def rows(surface: Any, size: float) -> Any:
     """Return rows with random geodesics, arcs of 0.2 to 2.5 sizes, the same for surfaces of the same shape."""
     rng = np.random.default_rng(1)
     node = np.zeros((COUNT, lay.ROW))
-    node[:, lay.KIND] = surface.kind
-    node[:, lay.DIM : lay.DIM + len(surface.dims)] = surface.dims
-    node[:, lay.SIZE] = surface.size
+    write_surface(surface, node)
     for k in range(COUNT):
         set_rotation(node, k, 1.0, 0.0, 0.0, 0.0)
         node[k, lay.S_P : lay.S_P + 3] = rng.normal(size=3) * 0.05

@@ -18,7 +18,7 @@ from mjwrap.errors import ModelError, StateError
 from mjwrap.kernels.musculotendon import tension as laws
 from mjwrap.mjcf import name_of
 from mjwrap.mjcf.actuators import mujoco_law
-from mjwrap.muscles.laws import Law, MuJoCoMuscle, PathActuator
+from mjwrap.muscles.laws import FiberLaw, Law, MuJoCoMuscle, parameter_row
 from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 
@@ -49,8 +49,8 @@ def as_unit(law: Law) -> Unit:
         short, long = (x / law.gear for x in law.length_range)
         optimal = (long - short) / (law.prm[1] - law.prm[0])
         return Unit(mujoco_peak_force(law), optimal, short - law.prm[0] * optimal, 0.0, (short, long))
-    if isinstance(law, PathActuator):
-        return Unit(law.optimal_force, math.nan, math.nan, 0.0, None)
+    if not isinstance(law, FiberLaw):
+        return Unit(law.strength, math.nan, math.nan, 0.0, None)
     peak, optimal, slack = (
         float(getattr(law, name))
         for name in ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
@@ -185,11 +185,9 @@ def _passive_tension(muscles: MuscleSystem, rest: ArrayLike | None) -> NDArray[n
     own = MuscleSystem(model)
     own.forward(data)
     tension = np.full(own.n, np.nan)
-    params = np.zeros((1, laws.PARAMS))
     for i in np.flatnonzero(own.status == 0):
         law = own.declarations[i].parameters
-        row = law.row()
-        params[0, : len(row)] = row
+        params = np.array([parameter_row(law)])
         tension[i] = laws.tension(law.code, params, 0, 0.0, own.length[i], 0.0)
     return tension
 

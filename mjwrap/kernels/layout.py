@@ -5,13 +5,30 @@ float64 array `node` (N, ROW): one argument instead of seven, because numba hand
 holds, in this order:
 
     KIND        VIA, CYLINDER, SPHERE, ...
-    DIM   (4)   sizes of the surface [m], in the order of its class in `mjwrap/surfaces/primitives.py`
+    DIM   (4)   what the mathematics of the kind needs, below; lengths in [m]
     SIZE        length by which steps on the surface are limited, about its smallest radius of curvature [m]
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
     HINT  (4)   flag (0 or 1), then the hint in S [m]
     S_... (11)  the saved solution: what a warm start needs, nothing else
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
+    TRAITS      what is true of the surface, as a sum of the bits below
+    Z_LIMIT     half length along local z beyond which a contact is out of range [m]; infinite where there is none
+    HANDLE      address of data that lie elsewhere, 0 where there are none
+
+The columns of a surface are filled by `mjwrap/surfaces/rows.py` from the surface's class, and by nothing else. Kernels
+ask for traits (`geometry/traits.py`); only `geometry/table.py` and `wraps/single.py` compare kinds.
+
+Several touches. A string may touch a surface with hollows more than once. Such a surface has as many consecutive
+rows as its class says (`touches`), the same in all columns but TOUCH, which numbers them: 0, 1, 2, ... The rows behind
+the first are known by TOUCH > 0. Each row has a saved solution of its own, so a saved branch has one line per row. What
+moves contacts between rows (`spans/active_set.py`) looks at a row and the next one, whatever their numbers. Two rows a
+surface are in use and tested so far; the hint stands in the first.
+
+Data elsewhere. Addresses and handles stand in float64 columns, which hold every integer below 2**53. A user's surface
+(CUSTOM) keeps the addresses of its three functions in DIM + 1 to DIM + 3. A surface that needs arrays, such as a mesh,
+puts the address or identifier of these into HANDLE; all rows of the surface have the same, and who made the rows keeps
+the arrays alive. Another device has other addresses: its copy of the rows needs its own.
 """
 
 KIND = 0
@@ -23,14 +40,33 @@ HINT = 18
 
 # ----------------------------------------------------------------------------------------- kinds of nodes
 VIA = 0
-CYLINDER = 1  # DIM: radius, half length (infinite: inf)
+CYLINDER = 1  # DIM: radius
 SPHERE = 2  # DIM: radius
 ELLIPSOID = 3  # DIM: three semi-axes
-ELLIPTIC_CYLINDER = 4  # DIM: two semi-axes, half length
+ELLIPTIC_CYLINDER = 4  # DIM: two semi-axes, infinity for the third
 TORUS = 5  # DIM: major radius, minor radius
-CONE = 6  # DIM: radius at z = 0, slope (radius gained per length along z), half length
+CONE = 6  # DIM: radius at z = 0, slope (radius gained per length along z)
 CAPSULE = 7  # DIM: radius, half length of the cylinder
-CUSTOM = 8  # DIM: radius about the origin that holds it (inf: unbounded), three addresses, see `custom.py`
+CUSTOM = (
+    8  # DIM: radius about the origin that holds it (inf: unbounded), three addresses, see `user_surface.py`
+)
+KINDS = 9  # one more than the largest
+
+# ------------------------------------------------------------------------------ traits of surfaces, as bits
+CLOSED_FORM = (
+    1  # the wrap between two points is known in closed form, `wraps/single.py`; else it is searched for
+)
+BRANCHED = 2  # the side on which a string passes is topological: S_SWEEP holds the angle that it sweeps
+HOLLOW = 4  # a straight segment that is tangent to the surface may enter it elsewhere
+ONE_SIDED = 8  # between two points there is one stable wrap at most, so that a hint or a search is needless
+DRAWN_HINTS = (
+    16  # a cold start may throw strings over it, with hints drawn by chance at SIZE around its origin
+)
+ELLIPSE_SECTIONS = 32  # it is the sphere stretched by DIM along the axes, so that plane sections are ellipses
+
+# ------------------------------------------------------------- values of INSIDE: what the solid is round about
+ABOUT_POINT = 1.0  # a sphere
+ABOUT_AXIS = 2.0  # a cylinder about z
 
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0
@@ -41,6 +77,7 @@ PENETRATING = 4
 NON_FINITE = 5
 OUT_OF_RANGE = 6
 NO_GEODESIC = 7
+UNKNOWN_SURFACE = 8
 
 # ------------------------------------------------------------------------ columns of the saved solution
 S_MODE = 22  # COLD, FREE or TOUCHED
@@ -79,8 +116,10 @@ W_SAVE = 93  # P, t, s before a trial step (7)
 W_OLD = 100  # the saved solution from which the solve started (11)
 W_KMIN = 111  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
 W_RMIN = 112  # smallest of r over the arc so far: <= 0 behind a conjugate point
-W_ANGLE = 113  # about the axis from P to Q [rad]; torus: how often the hole is passed; CUSTOM: 1 out of range, else 0
-TWIN = 114  # 1 in the second row of a surface that a string may touch twice, 0 else
+W_ANGLE = 113  # about the axis from P to Q [rad]; torus: how often the hole is passed
+TOUCH = (
+    114  # the row's number among the rows of its surface: 0, then 1, 2, ... where a string may touch it again
+)
 W_LAST = 115  # the saved solution before a single wrap (11)
 W_FRESH = 126  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
 W_BEST = 127  # the shortest solution that several cold starts have found (11)
@@ -90,7 +129,11 @@ W_FIRST = 150  # in a span's first row: ||f||^2 of the contacts from which it st
 W_REPAIRS = 151  # in a span's first row: how often the path was begun anew, from another start or in strides
 W_PIN = 152  # 1 where Q is at the path's last point, which lies on the surface; 0 else
 W_LAND = 153  # 1 while Q is to go there, however far it is; 0 else
-INSIDE = 154  # 1 where the string is held to the solid, alone between two fixed points (`inside.py`); 0 else
+INSIDE = 154  # ABOUT_POINT or ABOUT_AXIS where the string is held to the solid, alone between two fixed points; 0 else
+TRAITS = 155
+Z_LIMIT = 156
+HANDLE = 157
+W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
 ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`

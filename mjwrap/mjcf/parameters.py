@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -9,21 +11,20 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.actuators import curves_reason, is_muscle, keeps_state, mujoco_law, tendon_reason
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.wrapping_geoms import SIZES
+from mjwrap.muscles import laws
 from mjwrap.muscles.activation import FORMS, ActivationDynamics
-from mjwrap.muscles.laws import TENDONS, ActuatorForce, DeGrooteFregly2016, Law, Millard2012, PathActuator
+from mjwrap.muscles.laws import TENDONS, ActuatorForce, FiberLaw, Law, MuJoCoMuscle
 from mjwrap.text import counted
 
 OBJ = mujoco.mjtObj
 TIMES, SMOOTHING = "activation_time_constants", "activation_smoothing"
 LAW, TENDON, DYNAMICS = "law", "tendon_model", "activation_dynamics"  # what the names of texts contain
-HILL_NEEDS = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
-HILL_TAKES = ("pennation_angle", "max_contraction_velocity", "fiber_damping", TIMES, SMOOTHING)
-HILL_LAWS = {"degroote_fregly_2016": DeGrooteFregly2016, "millard_2012": Millard2012}
 # Per law: the numerics that it needs and those that it can do without.
 LAWS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    **dict.fromkeys(HILL_LAWS, (HILL_NEEDS, HILL_TAKES)),
-    "mujoco": ((), (TIMES, SMOOTHING)),
-    "path_actuator": (("optimal_force",), ()),
+    name: (law.needs, law.takes + (TIMES, SMOOTHING) * law.activated) for name, law in laws.LAWS.items()
+}
+FIBER_LAWS: dict[str, type[FiberLaw]] = {
+    name: law for name, law in laws.LAWS.items() if issubclass(law, FiberLaw)
 }
 NUMERICS = tuple(dict.fromkeys(key for needed, other in LAWS.values() for key in (*needed, *other)))
 TEXTS = (LAW, TENDON, DYNAMICS)
@@ -96,9 +97,9 @@ def build_law(
         raise ModelError(
             f"law '{law}' has no parameter {listed(unused)}; it has: {listed((*needed, *other))}"
         )
-    if law in HILL_LAWS:
-        values = {key: value[0] for key, value in given.items() if key not in (TIMES, SMOOTHING)}
-        found = HILL_LAWS[law](**values) if tendon is None else HILL_LAWS[law](**values, tendon=tendon)
+    values: dict[str, Any] = {key: value[0] for key, value in given.items() if key not in (TIMES, SMOOTHING)}
+    if law in FIBER_LAWS:
+        found = FIBER_LAWS[law](**values) if tendon is None else FIBER_LAWS[law](**values, tendon=tendon)
         if found.states == 2 and actuator >= 0 and not keeps_state(model, actuator):
             raise ModelError(
                 "an elastic tendon needs a fibre length as state, for which its actuator has no place: write it as "
@@ -107,10 +108,10 @@ def build_law(
         return found
     if tendon is not None:
         raise ModelError(
-            f"law '{law}' has no tendon; {TENDON} ({listed(TENDONS)}) is for {listed(HILL_LAWS)}"
+            f"law '{law}' has no tendon; {TENDON} ({listed(TENDONS)}) is for {listed(FIBER_LAWS)}"
         )
-    if law == "path_actuator":
-        return PathActuator(given["optimal_force"][0])
+    if law != MuJoCoMuscle.law:  # whose numbers are its actuator's
+        return laws.LAWS[law](**values)
     if native and actuator >= 0:
         astray = tendon_reason(model, actuator)
         if astray is not None:

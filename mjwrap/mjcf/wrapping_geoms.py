@@ -14,16 +14,8 @@ import numpy as np
 
 from mjwrap.errors import GeometryError, ModelError
 from mjwrap.mjcf.names import listed, name_of
-from mjwrap.surfaces import (
-    Capsule,
-    Cone,
-    Cylinder,
-    Ellipsoid,
-    EllipticCylinder,
-    Sphere,
-    Surface,
-    Torus,
-)
+from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
+from mjwrap.surfaces.primitives import SURFACES
 from mjwrap.text import counted
 
 GEOM, NUMERIC = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_NUMERIC
@@ -52,15 +44,9 @@ class _Sizes(NamedTuple):
 
 # By what a numeric's name contains: its values [m], in the order of the surface's class.
 SIZES: dict[str, _Sizes] = {
-    "sphere_size": _Sizes("radius", 1, Sphere),
-    "cylinder_size": _Sizes("radius half_length", 1, Cylinder),
-    "ellipsoid_size": _Sizes("radius_x radius_y radius_z", 3, lambda x, y, z: Ellipsoid((x, y, z))),
-    "elliptic_cylinder_size": _Sizes(
-        "radius_x radius_y half_length", 2, lambda x, y, *half: EllipticCylinder((x, y), *half)
-    ),
-    "torus_size": _Sizes("major_radius minor_radius", 2, Torus),
-    "cone_size": _Sizes("bottom_radius top_radius half_length", 3, Cone),
-    "capsule_size": _Sizes("radius half_length", 2, Capsule),
+    surface.numeric: _Sizes(surface.numeric_sizes, surface.numeric_least, surface.from_numeric)
+    for surface in SURFACES
+    if surface.numeric
 }
 
 

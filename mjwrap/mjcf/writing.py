@@ -11,8 +11,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed
 from mjwrap.mjcf.parameters import (
     DYNAMICS,
-    HILL_NEEDS,
-    HILL_TAKES,
+    FIBER_LAWS,
     LAW,
     NUMERICS,
     SMOOTHING,
@@ -22,14 +21,13 @@ from mjwrap.mjcf.parameters import (
 )
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles.activation import ActivationDynamics
-from mjwrap.muscles.laws import DeGrooteFregly2016, Millard2012
+from mjwrap.muscles.laws import FiberLaw
 
 OBJ = mujoco.mjtObj
-HillLaw = DeGrooteFregly2016 | Millard2012
 
 
 def set_laws(
-    spec: mujoco.MjSpec, laws: Mapping[str, HillLaw], dynamics: ActivationDynamics | None = None
+    spec: mujoco.MjSpec, laws: Mapping[str, FiberLaw], dynamics: ActivationDynamics | None = None
 ) -> None:
     """Give Hill-type laws to muscles of an MjSpec.
 
@@ -81,8 +79,8 @@ def set_laws(
 
 def _check(name: str, law: object, actuator: Any, entry: Any) -> None:
     """Raise `ModelError` where a muscle cannot have a law."""
-    if not isinstance(law, DeGrooteFregly2016 | Millard2012):
-        kinds = "DeGrooteFregly2016 or Millard2012"
+    if not isinstance(law, FiberLaw):
+        kinds = " or ".join(each.__name__ for each in FIBER_LAWS.values())
         raise ModelError(f"muscle '{name}': its law must be {kinds}, not {type(law).__name__}")
     mixed = [key for key in (*NUMERICS, *SIZES) if key in name]
     if mixed:
@@ -163,10 +161,10 @@ def _is_parameter(kind: mujoco.mjtObj, name: str, keep: tuple[str, ...]) -> bool
 
 
 def _write(
-    spec: mujoco.MjSpec, entry: Any, muscle: str, law: HillLaw, dynamics: ActivationDynamics | None
+    spec: mujoco.MjSpec, entry: Any, muscle: str, law: FiberLaw, dynamics: ActivationDynamics | None
 ) -> None:
     """Replace a tuple's parameters by those of a law."""
-    given = {key: getattr(law, key, None) for key in (*HILL_NEEDS, *HILL_TAKES)}
+    given = {key: getattr(law, key, None) for key in (*law.needs, *law.takes)}
     numerics = {key: [float(value)] for key, value in given.items() if value is not None}
     texts = {LAW: law.law, TENDON: law.tendon}
     if dynamics is not None:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.coupling.groups import Routes
-from mjwrap.kernels.musculotendon import dynamics, tension
+from mjwrap.kernels.musculotendon import dynamics, table
 from mjwrap.kernels.musculotendon.groups import Muscles
 from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
-from mjwrap.muscles.laws import ActuatorForce
+from mjwrap.muscles.laws import ActuatorForce, parameter_row
+from mjwrap.surfaces.rows import surface_rows
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,20 +93,12 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 
 
 def kernel_rows(node: Node) -> list[Array]:
-    """Return the kernels' rows of a stop, cold: one, or two for a surface that a string may touch twice."""
+    """Return the kernels' rows of a stop, cold: one, or several for a surface that a string may touch several times."""
+    if node.surface is not None:
+        return list(surface_rows(node.surface, node.inside))
     row = np.zeros(layout.ROW)
-    row[layout.S_MODE] = layout.COLD
-    if node.surface is None:
-        return [row]
-    dims = node.surface.dims
-    row[layout.KIND], row[layout.SIZE] = node.surface.kind, node.surface.size
-    row[layout.DIM : layout.DIM + len(dims)] = dims
-    row[layout.INSIDE] = float(node.inside)
-    if not node.surface.hollow:
-        return [row]
-    twin = row.copy()
-    twin[layout.TWIN] = 1.0
-    return [row, twin]
+    row[layout.KIND], row[layout.S_MODE] = layout.VIA, layout.COLD
+    return [row]
 
 
 def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
@@ -129,7 +122,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
             routes.append((first, len(links), route.origin, route.insertion, *bodies, m, surfaces))
             weights.append(route.weight)
     n = len(muscles)
-    params = np.zeros((n, tension.PARAMS))
     outputs = [
         int(model.actuator_outadr[m.actuator]) if isinstance(m.parameters, ActuatorForce) else -1
         for m in muscles
@@ -138,9 +130,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
     activations = [
         _activation(model, declared, source[0]) for declared, source in zip(muscles, sources, strict=True)
     ]
-    for m, declared in enumerate(muscles):
-        values = declared.parameters.row()
-        params[m, : len(values)] = values
     return Plan(
         n=n,
         node=np.array(rows).reshape(-1, layout.ROW),
@@ -148,7 +137,7 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         routes=np.array(routes, dtype=np.int64).reshape(-1, muscle_paths.ROUTE),
         weights=np.array(weights, dtype=np.float64),
         law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
-        params=params,
+        params=np.array([parameter_row(m.parameters) for m in muscles]).reshape(n, table.PARAMS),
         source=np.array([s[0] for s in sources], dtype=np.int64),
         index=np.array([s[1] for s in sources], dtype=np.int64),
         control=np.array([s[2] for s in sources], dtype=np.int64),

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import StateError
 from mjwrap.kernels.musculotendon import dynamics as kernels
-from mjwrap.kernels.musculotendon.tension import PARAMS
 from mjwrap.muscles.activation import ActivationDynamics
-from mjwrap.muscles.laws import Law
+from mjwrap.muscles.laws import Law, parameter_row
 
 Array = NDArray[np.float64]
 
@@ -94,9 +93,7 @@ def simulate_muscle(
     states[0] = initial_activation
     fibers[0] = kernels.NO_FIBER if initial_fiber_length is None else initial_fiber_length
     counts = np.zeros((t.size, 2), dtype=np.int64)
-    params = np.zeros((1, PARAMS))
-    row = law.row()
-    params[0, : len(row)] = row
+    params = np.array([parameter_row(law)])
     chosen = dynamics or ActivationDynamics()
     kernels.simulate(
         law.code, params, chosen.form, np.array(chosen.row()), t, lengths, speeds, drive, _rates(drive, t),

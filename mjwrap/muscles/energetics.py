@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.kernels.musculotendon import power as kernel
-from mjwrap.kernels.musculotendon import tension, umberger
+from mjwrap.kernels.musculotendon import umberger
 from mjwrap.kernels.musculotendon.fiber import F_MAX, OPTIMAL
+from mjwrap.kernels.musculotendon.table import has_fiber
 
 Vector = NDArray[np.float64]
-FIBERS = (tension.DEGROOTE_FREGLY, tension.MILLARD)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def metabolic_constants(
         )
     constants = np.zeros((len(law), umberger.CONSTANTS))
     for m, each in enumerate(models):
-        if each is not None and law[m] in FIBERS:
+        if each is not None and has_fiber(law[m]):
             constants[m] = each.row(params[m, F_MAX], params[m, OPTIMAL])
     return constants
 

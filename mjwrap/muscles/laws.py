@@ -1,6 +1,7 @@
-"""Musculotendon parameters: one frozen, validated dataclass per law; forces: `mjwrap/kernels/musculotendon/tension.py`.
+"""Musculotendon parameters: one frozen, validated dataclass per law, and the list of laws.
 
-A law fills one row of the kernels' parameter table. To add one: a section here, a section and a row there.
+A law fills one row of the kernels' parameter table; the kernels' side is `mjwrap/kernels/musculotendon/table.py`. How
+to add one: docs/adding_laws.md.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import ClassVar, Protocol
 
 from mjwrap import validation
 from mjwrap.errors import ModelError
-from mjwrap.kernels.musculotendon import degroote_fregly, millard, tension
+from mjwrap.kernels.musculotendon import degroote_fregly, millard, table
 from mjwrap.kernels.musculotendon.mujoco_muscle import MINVAL
 
 TENDONS = ("rigid", "elastic")
@@ -22,10 +23,13 @@ LEAST_COSINE = 0.1  # of the pennation angle, at the shortest fibre length (Mill
 
 
 class Law(Protocol):
-    """What the solver needs of a muscle law: its code, its name and its row of parameters."""
+    """What the solver needs of a muscle law: its code, its name, what MJCF may give it, and its row of parameters."""
 
     code: ClassVar[int]
     law: ClassVar[str]
+    needs: ClassVar[tuple[str, ...]]  # keyword arguments that a numeric has to give
+    takes: ClassVar[tuple[str, ...]]  # those that one may give
+    activated: ClassVar[bool]  # whether an activation follows the excitation; else that is the activation
 
     @property
     def states(self) -> int:
@@ -52,45 +56,11 @@ def _positive(law: Law, **values: float) -> None:
         validation.positive(value, f"{law.law}: {name}", ModelError)
 
 
-def _check_fiber(law: DeGrooteFregly2016 | Millard2012) -> None:
-    """Raise `ModelError` where a law with a fibre has sizes without sense."""
-    _positive(
-        law,
-        max_isometric_force=law.max_isometric_force,
-        optimal_fiber_length=law.optimal_fiber_length,
-        max_contraction_velocity=law.max_contraction_velocity,
-    )
-    slack, angle, damping = law.tendon_slack_length, law.pennation_angle, law.damping
-    validation.not_negative(slack, f"{law.law}: tendon_slack_length", ModelError, "m")
-    _require(law, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
-    validation.not_negative(damping, f"{law.law}: fiber_damping", ModelError)
-    if law.tendon not in TENDONS:
-        raise ModelError(f"{law.law}: tendon must be one of {', '.join(TENDONS)}, not {law.tendon!r}")
-
-
-def _is_elastic(law: DeGrooteFregly2016 | Millard2012) -> bool:
-    return law.tendon == "elastic" and law.tendon_slack_length >= SHORTEST_TENDON * law.optimal_fiber_length
-
-
-def _fiber_row(law: DeGrooteFregly2016 | Millard2012, least: float) -> tuple[float, ...]:
-    """Return the columns of `kernels/musculotendon/fiber.py`; least: shortest fibre of the law's curves [l_o]."""
-    height = law.optimal_fiber_length * math.sin(law.pennation_angle)
-    return (
-        law.max_isometric_force,
-        law.optimal_fiber_length,
-        law.tendon_slack_length,
-        law.pennation_angle,
-        law.max_contraction_velocity,
-        law.damping,
-        float(_is_elastic(law)),
-        height,
-        max(least * law.optimal_fiber_length, height / math.sqrt(1.0 - LEAST_COSINE**2)),
-    )
-
-
 @dataclass(frozen=True)
-class DeGrooteFregly2016:
-    """The muscle of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9) with pennation, rigid or elastic tendon.
+class FiberLaw:
+    """What laws with a fibre and a tendon share: sizes, checks, and the row of parameters.
+
+    A law adds its code, its name in MJCF and its shortest fibre.
 
     Args:
         max_isometric_force: [N], positive.
@@ -113,11 +83,26 @@ class DeGrooteFregly2016:
     max_contraction_velocity: float = 10.0
     fiber_damping: float | None = None
     tendon: str = "rigid"
-    code: ClassVar[int] = tension.DEGROOTE_FREGLY
-    law: ClassVar[str] = "degroote_fregly_2016"
+    code: ClassVar[int]
+    law: ClassVar[str]
+    least: ClassVar[float]  # shortest fibre of the law's curves [l_o]
+    needs: ClassVar[tuple[str, ...]] = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
+    takes: ClassVar[tuple[str, ...]] = ("pennation_angle", "max_contraction_velocity", "fiber_damping")
+    activated: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_fiber(self)
+        _positive(
+            self,
+            max_isometric_force=self.max_isometric_force,
+            optimal_fiber_length=self.optimal_fiber_length,
+            max_contraction_velocity=self.max_contraction_velocity,
+        )
+        angle = self.pennation_angle
+        validation.not_negative(self.tendon_slack_length, f"{self.law}: tendon_slack_length", ModelError, "m")
+        _require(self, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
+        validation.not_negative(self.damping, f"{self.law}: fiber_damping", ModelError)
+        if self.tendon not in TENDONS:
+            raise ModelError(f"{self.law}: tendon must be one of {', '.join(TENDONS)}, not {self.tendon!r}")
 
     @property
     def damping(self) -> float:
@@ -127,9 +112,15 @@ class DeGrooteFregly2016:
         return 0.1 if self.tendon == "elastic" else 0.0
 
     @property
+    def elastic(self) -> bool:
+        """Return whether the tendon is elastic: asked for, and long enough."""
+        long = self.tendon_slack_length >= SHORTEST_TENDON * self.optimal_fiber_length
+        return self.tendon == "elastic" and long
+
+    @property
     def states(self) -> int:
         """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
-        return 2 if _is_elastic(self) else 1
+        return 2 if self.elastic else 1
 
     @property
     def strength(self) -> float:
@@ -138,11 +129,45 @@ class DeGrooteFregly2016:
 
     def row(self) -> tuple[float, ...]:
         """Return the parameters in the order of `mjwrap/kernels/musculotendon/fiber.py`."""
-        return _fiber_row(self, degroote_fregly.LEAST)
+        height = self.optimal_fiber_length * math.sin(self.pennation_angle)
+        return (
+            self.max_isometric_force,
+            self.optimal_fiber_length,
+            self.tendon_slack_length,
+            self.pennation_angle,
+            self.max_contraction_velocity,
+            self.damping,
+            float(self.elastic),
+            height,
+            max(self.least * self.optimal_fiber_length, height / math.sqrt(1.0 - LEAST_COSINE**2)),
+        )
 
 
 @dataclass(frozen=True)
-class Millard2012:
+class DeGrooteFregly2016(FiberLaw):
+    """The muscle of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9) with pennation, rigid or elastic tendon.
+
+    Args:
+        max_isometric_force: [N], positive.
+        optimal_fiber_length: [m], positive.
+        tendon_slack_length: [m], not negative.
+        pennation_angle: at optimal fibre length [rad], in [0, pi/2).
+        max_contraction_velocity: [optimal fibre lengths/s].
+        fiber_damping: not negative [max isometric forces per max contraction velocity]; None for 0 with a rigid tendon
+            and 0.1 with an elastic one, whose fibre then has one velocity at every activation.
+        tendon: "rigid" or "elastic". A tendon shorter than 1e-4 optimal fibre lengths is always rigid.
+
+    Raises:
+        ModelError: a value is not possible.
+    """
+
+    code: ClassVar[int] = degroote_fregly.CODE
+    law: ClassVar[str] = "degroote_fregly_2016"
+    least: ClassVar[float] = degroote_fregly.LEAST
+
+
+@dataclass(frozen=True)
+class Millard2012(FiberLaw):
     """The damped muscle of Millard et al. 2013 (doi 10.1115/1.4023390, OpenSim's Millard2012EquilibriumMuscle).
 
     Curves have OpenSim's default shapes.
@@ -160,37 +185,10 @@ class Millard2012:
         ModelError: a value is not possible.
     """
 
-    max_isometric_force: float
-    optimal_fiber_length: float
-    tendon_slack_length: float
-    pennation_angle: float = 0.0
-    max_contraction_velocity: float = 10.0
     fiber_damping: float = 0.1
-    tendon: str = "rigid"
-    code: ClassVar[int] = tension.MILLARD
+    code: ClassVar[int] = millard.CODE
     law: ClassVar[str] = "millard_2012"
-
-    def __post_init__(self) -> None:
-        _check_fiber(self)
-
-    @property
-    def damping(self) -> float:
-        """Return the fibre damping in use."""
-        return self.fiber_damping
-
-    @property
-    def states(self) -> int:
-        """Return 1 (activation), or 2 (activation and fibre length) with an elastic tendon."""
-        return 2 if _is_elastic(self) else 1
-
-    @property
-    def strength(self) -> float:
-        """Return the maximum isometric force along the tendon [N]."""
-        return self.max_isometric_force * math.cos(self.pennation_angle)
-
-    def row(self) -> tuple[float, ...]:
-        """Return the parameters in the order of `mjwrap/kernels/musculotendon/fiber.py`."""
-        return _fiber_row(self, millard.LEAST)
+    least: ClassVar[float] = millard.LEAST
 
 
 _PRM = ("range[0]", "range[1]", "force", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax")
@@ -218,8 +216,11 @@ class MuJoCoMuscle:
     gear: float = 1.0
     force_range: tuple[float, float] = (-math.inf, math.inf)
     passive: tuple[float, ...] | None = None
-    code: ClassVar[int] = tension.MUJOCO
+    code: ClassVar[int] = table.MUJOCO
     law: ClassVar[str] = "mujoco"
+    needs: ClassVar[tuple[str, ...]] = ()
+    takes: ClassVar[tuple[str, ...]] = ()
+    activated: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         for what, prm in (("", self.prm), ("passive ", self.passive or self.prm)):
@@ -260,8 +261,11 @@ class MuJoCoMuscle:
 class ActuatorForce:
     """The force that MuJoCo computes for an actuator of any kind, whose path is mjwrap's; no tension here."""
 
-    code: ClassVar[int] = tension.PATH_ACTUATOR
+    code: ClassVar[int] = table.PATH_ACTUATOR
     law: ClassVar[str] = "mujoco"
+    needs: ClassVar[tuple[str, ...]] = ()
+    takes: ClassVar[tuple[str, ...]] = ()
+    activated: ClassVar[bool] = False
 
     @property
     def states(self) -> int:
@@ -274,7 +278,7 @@ class ActuatorForce:
         return math.inf
 
     def row(self) -> tuple[float, ...]:
-        """Return the parameter of `path_actuator` in `mjwrap/kernels/musculotendon/tension.py`: no force."""
+        """Return the parameter of `mjwrap/kernels/musculotendon/path_actuator.py`: no force."""
         return (0.0,)
 
 
@@ -286,8 +290,11 @@ class PathActuator:
     """
 
     optimal_force: float
-    code: ClassVar[int] = tension.PATH_ACTUATOR
+    code: ClassVar[int] = table.PATH_ACTUATOR
     law: ClassVar[str] = "path_actuator"
+    needs: ClassVar[tuple[str, ...]] = ("optimal_force",)
+    takes: ClassVar[tuple[str, ...]] = ()
+    activated: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _positive(self, optimal_force=self.optimal_force)
@@ -303,5 +310,20 @@ class PathActuator:
         return self.optimal_force
 
     def row(self) -> tuple[float, ...]:
-        """Return the parameter of `path_actuator` in `mjwrap/kernels/musculotendon/tension.py`."""
+        """Return the parameter of `mjwrap/kernels/musculotendon/path_actuator.py`."""
         return (self.optimal_force,)
+
+
+# Every law that a declaration can name. MJCF, `set_laws` and tests take their lists from here; where a declaration
+# names none, the first one whose needed numerics are given is meant.
+LAWS: dict[str, type[Law]] = {
+    law.law: law for law in (DeGrooteFregly2016, Millard2012, MuJoCoMuscle, PathActuator)
+}
+
+
+def parameter_row(law: Law) -> tuple[float, ...]:
+    """Return a law's parameters, padded to the kernels' columns; `ModelError` for a code that they do not know."""
+    if not table.known(law.code):
+        raise ModelError(f"{law.law}: the kernels know no law of code {law.code!r}")
+    row = law.row()
+    return (*row, *[0.0] * (table.PARAMS - len(row)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.spans import chain
-from mjwrap.surfaces import Cylinder, Sphere, Surface
+from mjwrap.surfaces import Surface
+from mjwrap.surfaces.rows import surface_rows
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -67,7 +69,7 @@ class Obstacle:
             raise GeometryError("Obstacle: quat must not be zero")
         if self.hint is not None:
             object.__setattr__(self, "hint", vector(self.hint, 3, "Obstacle: hint"))
-        if self.inside and self.surface not in (Sphere(self.surface.size), Cylinder(self.surface.size)):
+        if self.inside and not (self.surface.held_about and math.isinf(self.surface.z_limit)):
             raise GeometryError(
                 f"Obstacle: only a Sphere or a Cylinder without ends can have inside=True, not {self.surface!r}"
             )
@@ -87,16 +89,15 @@ class ViaPoint:
 
 
 def owners(obstacles: Sequence[Obstacle | ViaPoint]) -> NDArray[np.int64]:
-    """Return for every row of the kernels which obstacle it belongs to: a surface with hollows has two rows."""
+    """Return for every row of the kernels which obstacle it belongs to: a surface with hollows has several."""
     found: list[int] = []
     for k, obstacle in enumerate(obstacles):
-        twice = isinstance(obstacle, Obstacle) and obstacle.surface.hollow
-        found += [k, k] if twice else [k]
+        found += [k] * (obstacle.surface.touches if isinstance(obstacle, Obstacle) else 1)
     return np.array(found, dtype=np.int64)
 
 
 def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
-    """Return the kernels' rows for a list of obstacles, cold; two for a surface that a string may touch twice."""
+    """Return the kernels' rows for a list of obstacles, cold; several for a surface with hollows."""
     for k, obstacle in enumerate(obstacles):
         if not isinstance(obstacle, Obstacle | ViaPoint):
             raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")
@@ -110,26 +111,23 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
                 f"obstacles[{k}] and obstacles[{k + 1}]: an obstacle with inside=True must stand between end points or "
                 f"via points"
             )
-    owner = owners(obstacles)
-    node = np.zeros((len(owner), layout.ROW))
-    node[:, layout.S_MODE] = layout.COLD
-    for row, k in enumerate(owner):
-        obstacle = obstacles[k]
-        node[row, layout.POS : layout.POS + 3] = obstacle.pos
+    node = np.zeros((len(owners(obstacles)), layout.ROW))
+    first = 0
+    for obstacle in obstacles:
         if isinstance(obstacle, ViaPoint):
-            node[row, layout.KIND] = layout.VIA
+            node[first, layout.KIND], node[first, layout.S_MODE] = layout.VIA, layout.COLD
+            node[first, layout.POS : layout.POS + 3] = obstacle.pos
+            first += 1
             continue
-        node[row, layout.KIND] = obstacle.surface.kind
-        dims = obstacle.surface.dims
-        node[row, layout.DIM : layout.DIM + len(dims)] = dims
-        node[row, layout.SIZE] = obstacle.surface.size
-        node[row, layout.INSIDE] = float(obstacle.inside)
-        chain.set_rotation(node, row, *obstacle.quat)
-        if row > 0 and owner[row - 1] == k:
-            node[row, layout.TWIN] = 1.0
-        elif obstacle.hint is not None:
-            node[row, layout.HINT] = 1.0
-            node[row, layout.HINT + 1 : layout.HINT + 4] = obstacle.hint
+        rows = surface_rows(obstacle.surface, obstacle.inside)
+        rows[:, layout.POS : layout.POS + 3] = obstacle.pos
+        if obstacle.hint is not None:
+            rows[0, layout.HINT] = 1.0
+            rows[0, layout.HINT + 1 : layout.HINT + 4] = obstacle.hint
+        for row in range(len(rows)):
+            chain.set_rotation(rows, row, *obstacle.quat)
+        node[first : first + len(rows)] = rows
+        first += len(rows)
     return node
 
 

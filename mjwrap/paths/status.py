@@ -15,6 +15,7 @@ _MESSAGES = {
     "NON_FINITE": "a pose or an end point is not finite",
     "OUT_OF_RANGE": "the path touches a surface beyond the end of it, where it does not exist",
     "NO_GEODESIC": "no geodesic leads round the surface that way; a string would slip off its end",
+    "UNKNOWN_SURFACE": "the rows of a surface are of a kind that the kernels do not know: they were damaged",
 }
 
 
@@ -29,6 +30,7 @@ class Status(enum.IntEnum):
     NON_FINITE = layout.NON_FINITE
     OUT_OF_RANGE = layout.OUT_OF_RANGE
     NO_GEODESIC = layout.NO_GEODESIC
+    UNKNOWN_SURFACE = layout.UNKNOWN_SURFACE
 
     @property
     def message(self) -> str:

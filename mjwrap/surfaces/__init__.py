@@ -7,8 +7,8 @@ from mjwrap.surfaces.primitives import (
     Ellipsoid,
     EllipticCylinder,
     Sphere,
-    Surface,
     Torus,
 )
+from mjwrap.surfaces.surface import Surface
 
 __all__ = ["Capsule", "Cone", "Cylinder", "Ellipsoid", "EllipticCylinder", "Sphere", "Surface", "Torus"]

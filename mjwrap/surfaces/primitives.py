@@ -1,6 +1,6 @@
-"""Wrapping surfaces: frozen, validated descriptions without a pose.
+"""The built-in wrapping surfaces: frozen, validated descriptions without a pose.
 
-A surface knows its sizes and its row in the kernels' table (`kind`, `dims`, `size`); the mathematics is in
+A surface knows its sizes and what is true of it (`surface.py` says what a class can say); the mathematics is in
 `mjwrap/kernels`. Axes of revolution are local z, as in MuJoCo.
 """
 
@@ -8,47 +8,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from mjwrap import validation
+import numpy as np
+
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
+from mjwrap.surfaces.surface import Array, Surface, axes, positive
 
 FLATTEST_CONE = 1e-3  # smallest slope: a cone that is closer to a cylinder loses digits to its far apex
+UNBOUNDED = 4.0  # half length in a picture of a cylinder without one, in radii
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A smooth closed or unbounded surface in its own frame."""
-
-    kind: ClassVar[int]
-    hollow: ClassVar[bool] = False  # whether a taut string may bridge a hollow of it and so touch it twice
-
-    @property
-    def dims(self) -> tuple[float, ...]:
-        """Sizes in the order of the kernels' DIM columns [m]."""
-        raise NotImplementedError(f"{type(self).__name__} has no sizes")
-
-    @property
-    def size(self) -> float:
-        """A length by which steps on the surface are limited, about its smallest radius of curvature [m]."""
-        return self.dims[0]
+def _ball(count: int) -> tuple[Array, Array]:
+    """Return radii and heights (count,) of circles on the unit sphere, from pole to pole."""
+    rise = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count)
+    radii = np.cos(rise)
+    radii[[0, -1]] = 0.0
+    return radii, np.sin(rise)
 
 
-def _positive(surface: Surface, name: str, value: Any, unbounded: bool = False) -> float:
-    """Return a size as a float; raise `GeometryError` unless it is positive and, if not `unbounded`, finite."""
-    return validation.positive(value, f"{type(surface).__name__}: {name}", GeometryError, "m", unbounded)
-
-
-def _axes(surface: Surface, name: str, value: Any, count: int) -> None:
-    """Store a row of `count` positive sizes as a tuple of floats."""
-    try:
-        values = tuple(value)
-    except TypeError:
-        values = ()
-    if len(values) != count:
-        raise GeometryError(f"{type(surface).__name__}: {name} must be {count} sizes [m], not {value!r}")
-    object.__setattr__(surface, name, tuple(_positive(surface, name, x) for x in values))
+def _tube(radius: float, half: float, given: float | None, wide: float, count: int) -> tuple[Array, Array]:
+    """Return radii and heights (count,) of a cylinder's circles; without a half length the given one, or UNBOUNDED."""
+    if not math.isfinite(half):
+        half = UNBOUNDED * wide if given is None else given
+    return np.full(count, radius), np.linspace(-half, half, count)
 
 
 @dataclass(frozen=True)
@@ -62,15 +46,40 @@ class Cylinder(Surface):
     radius: float
     half_length: float = math.inf
     kind: ClassVar[int] = layout.CYLINDER
+    closed_form: ClassVar[bool] = True
+    branched: ClassVar[bool] = True
+    held_about: ClassVar[float] = layout.ABOUT_AXIS
+    geom_columns: ClassVar[tuple[tuple[int, int], ...]] = (
+        (0, layout.DIM),
+        (0, layout.SIZE),
+        (1, layout.Z_LIMIT),
+    )
+    numeric: ClassVar[str] = "cylinder_size"
+    numeric_sizes: ClassVar[str] = "radius half_length"
+    numeric_least: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
-        _positive(self, "radius", self.radius)
-        _positive(self, "half_length", self.half_length, unbounded=True)
+        positive(self, "radius", self.radius)
+        positive(self, "half_length", self.half_length, unbounded=True)
 
     @property
     def dims(self) -> tuple[float, ...]:
         """Radius and half length [m]."""
         return float(self.radius), float(self.half_length)
+
+    @property
+    def columns(self) -> tuple[float, ...]:
+        """The radius [m]."""
+        return (float(self.radius),)
+
+    @property
+    def z_limit(self) -> float:
+        """The half length [m]."""
+        return float(self.half_length)
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        return _tube(float(self.radius), self.half_length, half_length, self.radius, count)
 
 
 @dataclass(frozen=True)
@@ -82,14 +91,26 @@ class Sphere(Surface):
 
     radius: float
     kind: ClassVar[int] = layout.SPHERE
+    closed_form: ClassVar[bool] = True
+    one_sided: ClassVar[bool] = True
+    held_about: ClassVar[float] = layout.ABOUT_POINT
+    geom_columns: ClassVar[tuple[tuple[int, int], ...]] = ((0, layout.DIM), (0, layout.SIZE))
+    numeric: ClassVar[str] = "sphere_size"
+    numeric_sizes: ClassVar[str] = "radius"
+    numeric_least: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
-        _positive(self, "radius", self.radius)
+        positive(self, "radius", self.radius)
 
     @property
     def dims(self) -> tuple[float, ...]:
         """The radius [m]."""
         return (float(self.radius),)
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        radii, height = _ball(count)
+        return self.radius * radii, self.radius * height
 
 
 @dataclass(frozen=True)
@@ -101,9 +122,13 @@ class Ellipsoid(Surface):
 
     radii: tuple[float, float, float]
     kind: ClassVar[int] = layout.ELLIPSOID
+    ellipse_sections: ClassVar[bool] = True
+    numeric: ClassVar[str] = "ellipsoid_size"
+    numeric_sizes: ClassVar[str] = "radius_x radius_y radius_z"
+    numeric_least: ClassVar[int] = 3
 
     def __post_init__(self) -> None:
-        _axes(self, "radii", self.radii, 3)
+        axes(self, "radii", self.radii, 3)
 
     @property
     def dims(self) -> tuple[float, ...]:
@@ -114,6 +139,22 @@ class Ellipsoid(Surface):
     def size(self) -> float:
         """The smallest semi-axis [m]."""
         return min(self.radii)
+
+    @classmethod
+    def from_numeric(cls, *values: float) -> Ellipsoid:
+        """See `Surface`."""
+        x, y, z = values
+        return cls((x, y, z))
+
+    @property
+    def stretch(self) -> tuple[float, float]:
+        """Both semi-axes of the section [m]."""
+        return self.radii[0], self.radii[1]
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        radii, height = _ball(count)
+        return radii, self.radii[2] * height
 
 
 @dataclass(frozen=True)
@@ -127,10 +168,15 @@ class EllipticCylinder(Surface):
     radii: tuple[float, float]
     half_length: float = math.inf
     kind: ClassVar[int] = layout.ELLIPTIC_CYLINDER
+    closed_form: ClassVar[bool] = True
+    branched: ClassVar[bool] = True
+    numeric: ClassVar[str] = "elliptic_cylinder_size"
+    numeric_sizes: ClassVar[str] = "radius_x radius_y half_length"
+    numeric_least: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        _axes(self, "radii", self.radii, 2)
-        _positive(self, "half_length", self.half_length, unbounded=True)
+        axes(self, "radii", self.radii, 2)
+        positive(self, "half_length", self.half_length, unbounded=True)
 
     @property
     def dims(self) -> tuple[float, ...]:
@@ -141,6 +187,31 @@ class EllipticCylinder(Surface):
     def size(self) -> float:
         """The smaller semi-axis [m]."""
         return min(self.radii)
+
+    @classmethod
+    def from_numeric(cls, *values: float) -> EllipticCylinder:
+        """See `Surface`."""
+        x, y, *half = values
+        return cls((x, y), *half)
+
+    @property
+    def columns(self) -> tuple[float, ...]:
+        """Both semi-axes and infinity for the third: to the kernels it is an ellipsoid [m]."""
+        return (*self.radii, math.inf)
+
+    @property
+    def z_limit(self) -> float:
+        """The half length [m]."""
+        return float(self.half_length)
+
+    @property
+    def stretch(self) -> tuple[float, float]:
+        """Both semi-axes of the section [m]."""
+        return self.radii[0], self.radii[1]
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        return _tube(1.0, self.half_length, half_length, max(self.radii), count)
 
 
 @dataclass(frozen=True)
@@ -154,11 +225,15 @@ class Torus(Surface):
     major_radius: float
     minor_radius: float
     kind: ClassVar[int] = layout.TORUS
-    hollow: ClassVar[bool] = True
+    branched: ClassVar[bool] = True
+    touches: ClassVar[int] = 2  # over the hole
+    numeric: ClassVar[str] = "torus_size"
+    numeric_sizes: ClassVar[str] = "major_radius minor_radius"
+    numeric_least: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        major = _positive(self, "major_radius", self.major_radius)
-        if _positive(self, "minor_radius", self.minor_radius) >= major:
+        major = positive(self, "major_radius", self.major_radius)
+        if positive(self, "minor_radius", self.minor_radius) >= major:
             raise GeometryError(
                 f"Torus: minor_radius must be smaller than major_radius, not {self.minor_radius!r} of {major!r} [m]"
             )
@@ -172,6 +247,12 @@ class Torus(Surface):
     def size(self) -> float:
         """The radius of the tube [m]."""
         return float(self.minor_radius)
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        turn = np.linspace(0.0, 2.0 * math.pi, count)
+        turn[-1] = 0.0
+        return self.major_radius + self.minor_radius * np.cos(turn), self.minor_radius * np.sin(turn)
 
 
 @dataclass(frozen=True)
@@ -193,12 +274,17 @@ class Cone(Surface):
     top_radius: float
     half_length: float
     kind: ClassVar[int] = layout.CONE
+    closed_form: ClassVar[bool] = True
+    branched: ClassVar[bool] = True
+    numeric: ClassVar[str] = "cone_size"
+    numeric_sizes: ClassVar[str] = "bottom_radius top_radius half_length"
+    numeric_least: ClassVar[int] = 3
 
     def __post_init__(self) -> None:
         for name in ("bottom_radius", "top_radius"):
             if getattr(self, name) != 0.0:
-                _positive(self, name, getattr(self, name))
-        _positive(self, "half_length", self.half_length)
+                positive(self, name, getattr(self, name))
+        positive(self, "half_length", self.half_length)
         if abs(self.dims[1]) < FLATTEST_CONE:
             raise GeometryError(
                 f"Cone: radii {self.bottom_radius!r} and {self.top_radius!r} over a length of "
@@ -210,6 +296,21 @@ class Cone(Surface):
         """Radius at z = 0 [m], slope dr/dz, half length [m]."""
         slope = (float(self.top_radius) - float(self.bottom_radius)) / (2.0 * float(self.half_length))
         return 0.5 * (float(self.top_radius) + float(self.bottom_radius)), slope, float(self.half_length)
+
+    @property
+    def columns(self) -> tuple[float, ...]:
+        """Radius at z = 0 [m] and slope."""
+        return self.dims[:2]
+
+    @property
+    def z_limit(self) -> float:
+        """The half length [m]."""
+        return float(self.half_length)
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        height = np.linspace(-self.half_length, self.half_length, count)
+        return np.linspace(self.bottom_radius, self.top_radius, count), height
 
 
 @dataclass(frozen=True)
@@ -223,12 +324,37 @@ class Capsule(Surface):
     radius: float
     half_length: float
     kind: ClassVar[int] = layout.CAPSULE
+    geom_columns: ClassVar[tuple[tuple[int, int], ...]] = (
+        (0, layout.DIM),
+        (1, layout.DIM + 1),
+        (0, layout.SIZE),
+    )
+    numeric: ClassVar[str] = "capsule_size"
+    numeric_sizes: ClassVar[str] = "radius half_length"
+    numeric_least: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        _positive(self, "radius", self.radius)
-        _positive(self, "half_length", self.half_length)
+        positive(self, "radius", self.radius)
+        positive(self, "half_length", self.half_length)
 
     @property
     def dims(self) -> tuple[float, ...]:
         """Radius and half length [m]."""
         return float(self.radius), float(self.half_length)
+
+    def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
+        """See `Surface`."""
+        radii, height = _ball(count)
+        return self.radius * radii, self.radius * height + self.half_length * np.sign(height)
+
+
+# Every built-in surface. MJCF declarations and tests take their lists from here.
+SURFACES: tuple[type[Surface], ...] = (
+    Sphere,
+    Cylinder,
+    Ellipsoid,
+    EllipticCylinder,
+    Torus,
+    Cone,
+    Capsule,
+)

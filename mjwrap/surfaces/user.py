@@ -11,7 +11,7 @@ from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.surfaces.codegen import build, library
 from mjwrap.surfaces.codegen.parametric import Chart
-from mjwrap.surfaces.primitives import Surface
+from mjwrap.surfaces.surface import Surface
 
 Function = Callable[..., Any] | str
 
@@ -20,7 +20,8 @@ class CustomSurface(Surface):
     """A surface made of machine code; equal to any other made from the same source and numbers."""
 
     kind: ClassVar[int] = layout.CUSTOM
-    hollow: ClassVar[bool] = True
+    touches: ClassVar[int] = 2  # whether it has hollows is not known
+    drawn_hints: ClassVar[bool] = False  # each would cost a search by calls of its functions
     _made: build.Made
 
     def _set(self, made: build.Made) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjwrap.errors import StateError
 from mjwrap.kernels.coupling import finite_checks
-from mjwrap.kernels.geometry import projection
+from mjwrap.kernels.geometry.table import height
 from mjwrap.mjcf import MuscleDeclaration, name_of
 from mjwrap.model.arrays import kernel_rows
 
@@ -33,7 +33,7 @@ def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDecla
                 local = poses.geom_xmat[node.geom].reshape(3, 3).T @ (
                     poses.site_xpos[site] - poses.geom_xpos[node.geom]
                 )
-                if projection.height(np.array(kernel_rows(node)), 0, *local.tolist()) < 0.0:
+                if height(np.array(kernel_rows(node)), 0, *local.tolist()) < 0.0:
                     inner = name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
                     outer = name_of(model, mujoco.mjtObj.mjOBJ_GEOM, node.geom)
                     found.append(f"site '{inner}' is inside geom '{outer}'")

@@ -1,7 +1,4 @@
-"""The table of surfaces: one row each for its geodesic, its projection and its height.
-
-The integrator is chosen here, outside its loop. A surface's own file holds the mathematics.
-"""
+"""A row's geodesic in the world, evaluated and displaced; the surface's own part is chosen by `table.py`."""
 
 from __future__ import annotations
 
@@ -9,16 +6,12 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
-from mjwrap.kernels.geometry.closed_forms import capsule, cone, cylinder, sphere
-from mjwrap.kernels.geometry.projection import project
-from mjwrap.kernels.geometry.quadric import quadric
-from mjwrap.kernels.geometry.torus import torus
-from mjwrap.kernels.geometry.user_surface import custom_geodesic
+from mjwrap.kernels.geometry.table import evaluate_geodesic, project
 from mjwrap.kernels.geometry.vectors import cross
 
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
 W_BP, W_BQ = lay.W_BP, lay.W_BQ
-KIND, POS = lay.KIND, lay.POS
+POS = lay.POS
 S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
 
 
@@ -28,21 +21,7 @@ def geodesic(k, node, base_x, base_y, base_z):
 
     Points come out in the world frame relative to (base_x, base_y, base_z) [m], directions in the world frame.
     """
-    kind = node[k, KIND]
-    if kind == lay.CYLINDER:
-        cylinder(k, node)
-    elif kind == lay.SPHERE:
-        sphere(k, node)
-    elif kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
-        quadric(k, node)
-    elif kind == lay.TORUS:
-        torus(k, node)
-    elif kind == lay.CONE:
-        cone(k, node)
-    elif kind == lay.CUSTOM:
-        custom_geodesic(k, node)
-    else:
-        capsule(k, node)
+    evaluate_geodesic(k, node)
     x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z
     node[k, W_P] += x
     node[k, W_P + 1] += y

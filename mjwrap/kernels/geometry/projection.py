@@ -1,7 +1,7 @@
-"""Where surfaces are: nearest point and normal, signed height, and how deep a straight segment dips.
+"""Frames of rows, and per surface the nearest point with its normal and the signed height over it.
 
-Everything in the frame S of the obstacle. The height is negative inside, positive outside, and to first order the
-distance where it is small.
+Everything but the first two functions in the frame S of the obstacle; `table.py` chooses among them. The height is
+negative inside, positive outside, and to first order the distance where it is small.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geometry.closed_forms import capsule_normal
 from mjwrap.kernels.geometry.quadric import inverse_squares, onto
-from mjwrap.kernels.geometry.user_surface import custom_height, custom_project
 
-KIND, DIM, SIZE, POS, ROT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.ROT
+DIM, SIZE, POS, ROT = lay.DIM, lay.SIZE, lay.POS, lay.ROT
 
 
 @jit
@@ -37,7 +36,8 @@ def turn_into_frame(node, k, x, y, z):
 
 
 @jit
-def _project_cylinder(radius, x, y, z):
+def project_cylinder(radius, x, y, z):
+    """Return the nearest point of the cylinder and the normal there."""
     rho = math.sqrt(x * x + y * y)
     if rho == 0.0:
         return radius, 0.0, z, 1.0, 0.0, 0.0
@@ -46,7 +46,8 @@ def _project_cylinder(radius, x, y, z):
 
 
 @jit
-def _project_sphere(radius, x, y, z):
+def project_sphere(radius, x, y, z):
+    """Return the nearest point of the sphere and the normal there."""
     rho = math.sqrt(x * x + y * y + z * z)
     if rho == 0.0:
         return radius, 0.0, 0.0, 1.0, 0.0, 0.0
@@ -55,7 +56,7 @@ def _project_sphere(radius, x, y, z):
 
 
 @jit
-def _project_quadric(node, k, x, y, z):
+def project_quadric(node, k, x, y, z):
     """Return the point on the ray from the centre (or axis), which is near the nearest one for points near by."""
     ia, ib, ic = inverse_squares(node, k)
     if ia * x * x + ib * y * y + ic * z * z == 0.0:
@@ -67,7 +68,8 @@ def _project_quadric(node, k, x, y, z):
 
 
 @jit
-def _project_torus(major, minor, x, y, z):
+def project_torus(major, minor, x, y, z):
+    """Return the nearest point of the torus and the normal there."""
     rho = math.sqrt(x * x + y * y)
     cu, su = 1.0, 0.0
     if rho > 0.0:
@@ -81,7 +83,7 @@ def _project_torus(major, minor, x, y, z):
 
 
 @jit
-def _project_cone(radius, slope, x, y, z):
+def project_cone(radius, slope, x, y, z):
     """Return the nearest point of the nappe, kept off the apex."""
     rho = math.sqrt(x * x + y * y)
     cu, su = 1.0, 0.0
@@ -98,25 +100,8 @@ def _project_cone(radius, slope, x, y, z):
 
 
 @jit
-def project(node, k, x, y, z):
-    """Return a point of obstacle k's surface near (x, y, z), and the outward normal there; frame S.
-
-    The nearest one but on ellipsoid and elliptic cylinder, where it lies on the ray from the centre or axis.
-    """
-    kind = node[k, KIND]
-    if kind == lay.CYLINDER:
-        return _project_cylinder(node[k, DIM], x, y, z)
-    if kind == lay.SPHERE:
-        return _project_sphere(node[k, DIM], x, y, z)
-    if kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
-        return _project_quadric(node, k, x, y, z)
-    if kind == lay.TORUS:
-        return _project_torus(node[k, DIM], node[k, DIM + 1], x, y, z)
-    if kind == lay.CONE:
-        return _project_cone(node[k, DIM], node[k, DIM + 1], x, y, z)
-    if kind == lay.CUSTOM:
-        return custom_project(k, node, x, y, z)
-    radius, half = node[k, DIM], node[k, DIM + 1]
+def project_capsule(radius, half, x, y, z):
+    """Return the nearest point of the capsule and the normal there."""
     nx, ny, nz = capsule_normal(radius, half, x, y, z)
     return radius * nx, radius * ny, min(max(z, -half), half) + radius * nz, nx, ny, nz
 
@@ -125,30 +110,46 @@ def project(node, k, x, y, z):
 
 
 @jit
-def height(node, k, x, y, z):
-    """Return the signed height of a point of S over obstacle k's surface [m]."""
-    kind = node[k, KIND]
-    if kind == lay.CYLINDER:
-        return math.sqrt(x * x + y * y) - node[k, DIM]
-    if kind == lay.SPHERE:
-        return math.sqrt(x * x + y * y + z * z) - node[k, DIM]
-    if kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
-        ia, ib, ic = inverse_squares(node, k)
-        gx, gy, gz = ia * x, ib * y, ic * z
-        square = gx * gx + gy * gy + gz * gz
-        if square == 0.0:
-            return -node[k, SIZE]
-        phi = gx * x + gy * y + gz * z
-        return (phi - math.sqrt(phi)) / math.sqrt(square)
-    if kind == lay.TORUS:
-        rho = math.sqrt(x * x + y * y) - node[k, DIM]
-        return math.sqrt(rho * rho + z * z) - node[k, DIM + 1]
-    if kind == lay.CONE:
-        slope = node[k, DIM + 1]
-        reach = node[k, DIM] + slope * z
-        rho = math.sqrt(x * x + y * y)
-        return (rho - reach) / math.sqrt(1.0 + slope * slope)
-    if kind == lay.CUSTOM:
-        return custom_height(k, node, x, y, z)
-    z -= min(max(z, -node[k, DIM + 1]), node[k, DIM + 1])
-    return math.sqrt(x * x + y * y + z * z) - node[k, DIM]
+def height_over_cylinder(radius, x, y):
+    """Return the distance from a cylinder [m]."""
+    return math.sqrt(x * x + y * y) - radius
+
+
+@jit
+def height_over_sphere(radius, x, y, z):
+    """Return the distance from a sphere [m]."""
+    return math.sqrt(x * x + y * y + z * z) - radius
+
+
+@jit
+def height_over_quadric(node, k, x, y, z):
+    """Return the height over an ellipsoid or elliptic cylinder [m], minus its size in the centre."""
+    ia, ib, ic = inverse_squares(node, k)
+    gx, gy, gz = ia * x, ib * y, ic * z
+    square = gx * gx + gy * gy + gz * gz
+    if square == 0.0:
+        return -node[k, SIZE]
+    phi = gx * x + gy * y + gz * z
+    return (phi - math.sqrt(phi)) / math.sqrt(square)
+
+
+@jit
+def height_over_torus(major, minor, x, y, z):
+    """Return the distance from a torus [m]."""
+    rho = math.sqrt(x * x + y * y) - major
+    return math.sqrt(rho * rho + z * z) - minor
+
+
+@jit
+def height_over_cone(radius, slope, x, y, z):
+    """Return the distance from a cone's nappe, as if it went on beyond the apex [m]."""
+    reach = radius + slope * z
+    rho = math.sqrt(x * x + y * y)
+    return (rho - reach) / math.sqrt(1.0 + slope * slope)
+
+
+@jit
+def height_over_capsule(radius, half, x, y, z):
+    """Return the distance from a capsule [m]."""
+    z -= min(max(z, -half), half)
+    return math.sqrt(x * x + y * y + z * z) - radius

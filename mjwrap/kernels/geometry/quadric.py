@@ -32,15 +32,14 @@ from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, 
 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
 STEP = 0.8  # first step tried, in units of the local length scale
+NEAREST_STEPS = 60  # to the nearest point of an ellipsoid; five to ten are normal
+OFF_AXIS = 1e-9  # least share of a semi-axis by which a point is taken to be off the middle plane
 
 
 @jit
 def inverse_squares(node, k):
-    """Return 1/a^2, 1/b^2, 1/c^2 of row k; the last is zero for an elliptic cylinder."""
-    a, b = node[k, DIM], node[k, DIM + 1]
-    if node[k, lay.KIND] == lay.ELLIPTIC_CYLINDER:
-        return 1.0 / (a * a), 1.0 / (b * b), 0.0
-    c = node[k, DIM + 2]
+    """Return 1/a^2, 1/b^2, 1/c^2 of row k; the last is zero for an elliptic cylinder, whose c is infinite."""
+    a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
     return 1.0 / (a * a), 1.0 / (b * b), 1.0 / (c * c)
 
 
@@ -51,6 +50,36 @@ def onto(ia, ib, ic, x, y, z):
     if ic == 0.0:
         return scale * x, scale * y, z
     return scale * x, scale * y, scale * z
+
+
+@jit
+def nearest_on_quadric(node, k, x, y, z):
+    """Return the point of an ellipsoid or elliptic cylinder nearest to a point inside it; frame S.
+
+    Each coordinate of it is a^2 x / (a^2 + s), where s < 0 makes the sum of squares over a^2 one. That sum is convex
+    and falls with s, so Newton's method comes to the root from the left without a safeguard.
+    """
+    a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
+    ia, ib, ic = inverse_squares(node, k)
+    if ic == 0.0:
+        c = 1.0
+    u, v, w = max(abs(x) / a, OFF_AXIS), max(abs(y) / b, OFF_AXIS), max(abs(z) / c, OFF_AXIS)
+    if ic == 0.0:
+        w = 0.0
+    s = max(a * a * (u - 1.0), b * b * (v - 1.0))
+    if ic > 0.0:
+        s = max(s, c * c * (w - 1.0))
+    p, q, r = u, v, w
+    for _ in range(NEAREST_STEPS):
+        fa, fb, fc = 1.0 / (1.0 + s * ia), 1.0 / (1.0 + s * ib), 1.0 / (1.0 + s * ic)
+        p, q, r = u * fa, v * fb, w * fc
+        rest = p * p + q * q + r * r - 1.0
+        move = 0.5 * rest / (p * p * ia * fa + q * q * ib * fb + r * r * ic * fc)
+        s += move
+        if rest <= 4e-16:
+            break
+    px, py = math.copysign(a * p, x), math.copysign(b * q, y)
+    return onto(ia, ib, ic, px, py, z if ic == 0.0 else math.copysign(c * r, z))
 
 
 @inlined

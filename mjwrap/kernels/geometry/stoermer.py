@@ -10,11 +10,8 @@ difference bounds the error. The surfaces write the rule out with their own f; l
 
 from __future__ import annotations
 
-import collections
-import ctypes
 from typing import Any
 
-import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -44,14 +41,14 @@ TOLERANCE = 1e-11  # of the estimate: the error of a step is then below 1e-12, m
 SHRINK = 1.0 / 15.0  # power by which a rejected step shrinks
 MAX_STEPS = 200  # of one geodesic, rejected ones included
 
-_recent: collections.deque[Any] = collections.deque(maxlen=64)
+
+def _plain_stack() -> None:
+    """Return what stands for a pointer where nothing is compiled: `_plain_carray` makes the memory."""
 
 
-def _plain_stack() -> Any:
-    """Return a pointer to ROWS x LANES doubles, which live until 64 more have been asked for (uncompiled kernels)."""
-    memory = (ctypes.c_double * (ROWS * LANES))()
-    _recent.append(memory)  # `carray` does not hold its memory
-    return ctypes.cast(memory, ctypes.POINTER(ctypes.c_double))
+def _plain_carray(pointer: None, shape: tuple[int, ...]) -> Any:
+    """Return an array of its own, which lives as long as it is used (uncompiled kernels)."""
+    return np.empty(shape)
 
 
 def _stack(typing_context: Any) -> Any:
@@ -66,7 +63,9 @@ def _stack(typing_context: Any) -> Any:
 
 def _carray() -> Any:
     """Return what makes an array of a pointer; numba's own makes one whose references are counted."""
-    if config.DISABLE_JIT or is_plain():
+    if config.DISABLE_JIT:
+        return _plain_carray
+    if is_plain():
         return getattr(numba, "carray")  # noqa: B009
     from numba.np.arrayobj import get_cfarray_intrinsic
 

@@ -125,7 +125,7 @@ _call_height: Any = _height_plain if config.DISABLE_JIT else intrinsic(_height_c
 def custom_geodesic(k, node):
     """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row; world directions, no base point.
 
-    Column W_ANGLE says whether it leaves the surface's range of validity (1) or not (0).
+    Column W_OUT says whether it leaves the surface's range of validity (1) or not (0).
     """
     i = lay.S_P
     start = (
@@ -137,7 +137,7 @@ def custom_geodesic(k, node):
     put_curvature(node, k, lay.W_KP, out[18], out[19], out[20])
     put_curvature(node, k, lay.W_KQ, out[21], out[22], out[23])
     put_fields(node, k, out[24], out[25], out[26], out[27], out[28], out[29])
-    node[k, lay.W_ANGLE] = out[30]
+    node[k, lay.W_OUT] = out[30]
 
 
 @jit

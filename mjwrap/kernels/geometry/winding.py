@@ -13,7 +13,7 @@ from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geometry.clearance import tube_angle, tube_crossing
 from mjwrap.kernels.geometry.projection import turn_into_frame
 
-KIND, DIM = lay.KIND, lay.DIM
+DIM = lay.DIM
 S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
 W_P, W_Q, W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_P, lay.W_Q, lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
 
@@ -50,24 +50,18 @@ def tangents_sweep(root_a, root_b, radius):
 
 
 @jit
-def branched(kind):
-    """Return whether the side on which a string passes a surface is topological, and S_SWEEP holds it."""
-    return kind == lay.CYLINDER or kind == lay.ELLIPTIC_CYLINDER or kind == lay.CONE or kind == lay.TORUS
+def swept_about_cylinder(k, node):
+    """Return the angle that the path of the last evaluation sweeps about a cylinder's axis, with sign [rad]."""
+    inverse = 1.0 / node[k, DIM]
+    t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
+    rate = t_phi * inverse
+    free = tangents_sweep(node[k, W_L] * abs(rate), node[k, W_LQ] * abs(rate), 1.0)
+    return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
 
 
 @jit
-def swept(k, node):
-    """Return the angle that the path of the last evaluation sweeps, with sign [rad].
-
-    About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the
-    middle of a torus' tube.
-    """
-    if node[k, KIND] == lay.CYLINDER:
-        inverse = 1.0 / node[k, DIM]
-        t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
-        rate = t_phi * inverse
-        free = tangents_sweep(node[k, W_L] * abs(rate), node[k, W_LQ] * abs(rate), 1.0)
-        return node[k, S_ARC] * rate + (free if t_phi >= 0.0 else -free)
+def _corners(k, node):
+    """Return A, P, Q and B of the last evaluation in the frame S: where the path comes from, touches, and goes."""
     px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
     size = -node[k, W_L]
     ex, ey, ez = turn_into_frame(
@@ -85,27 +79,37 @@ def swept(k, node):
     ex, ey, ez = turn_into_frame(
         node, k, size * node[k, W_EQ], size * node[k, W_EQ + 1], size * node[k, W_EQ + 2]
     )
-    bx, by, bz = qx + ex, qy + ey, qz + ez
-    if node[k, KIND] == lay.TORUS:
-        major = node[k, DIM]
-        turns = tube_crossing(major, ax, ay, az, px, py, pz) + tube_crossing(major, qx, qy, qz, bx, by, bz)
-        return (
-            tube_angle(major, bx, by, bz)
-            - tube_angle(major, ax, ay, az)
-            + 2.0 * math.pi * (turns + node[k, W_ANGLE])
-        )
-    if node[k, KIND] == lay.ELLIPTIC_CYLINDER:
-        ia, ib = 1.0 / node[k, DIM], 1.0 / node[k, DIM + 1]
-        ax, ay, px, py, qx, qy, bx, by = (
-            ia * ax,
-            ib * ay,
-            ia * px,
-            ib * py,
-            ia * qx,
-            ib * qy,
-            ia * bx,
-            ib * by,
-        )
+    return ax, ay, az, px, py, pz, qx, qy, qz, qx + ex, qy + ey, qz + ez
+
+
+@jit
+def swept_about_tube(k, node):
+    """Return the angle that the path of the last evaluation sweeps about the middle of a torus' tube [rad]."""
+    ax, ay, az, px, py, pz, qx, qy, qz, bx, by, bz = _corners(k, node)
+    major = node[k, DIM]
+    turns = tube_crossing(major, ax, ay, az, px, py, pz) + tube_crossing(major, qx, qy, qz, bx, by, bz)
+    return (
+        tube_angle(major, bx, by, bz)
+        - tube_angle(major, ax, ay, az)
+        + 2.0 * math.pi * (turns + node[k, W_ANGLE])
+    )
+
+
+@jit
+def straight_about_tube(major, ax, ay, az, bx, by, bz):
+    """Return the angle that the straight segment from A to B sweeps about the middle of a torus' tube [rad]."""
+    turns = tube_crossing(major, ax, ay, az, bx, by, bz)
+    return tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az) + 2.0 * math.pi * turns
+
+
+@jit
+def swept_about_axis(k, node, ia, ib):
+    """Return the angle about z that the path of the last evaluation sweeps, x scaled by ia and y by ib [rad].
+
+    The geodesic's own share is W_ANGLE, in the same image.
+    """
+    ax, ay, _, px, py, _, qx, qy, _, bx, by, _ = _corners(k, node)
+    ax, ay, px, py, qx, qy, bx, by = ia * ax, ib * ay, ia * px, ib * py, ia * qx, ib * qy, ia * bx, ib * by
     return (
         math.atan2(ax * py - ay * px, ax * px + ay * py)
         + node[k, W_ANGLE]

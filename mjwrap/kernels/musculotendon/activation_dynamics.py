@@ -24,18 +24,22 @@ MOST = 20  # Newton steps in the last panel; two or three are normal
 
 @jit
 def rate(form, u, a, activation_time, deactivation_time, smoothing):
-    """Return da/dt [1/s] under either form; smoothing is the smooth form's b."""
+    """Return da/dt [1/s] under either form, NaN under another; smoothing is the smooth form's b."""
     if form == SMOOTH:
         return smooth_rate(u, a, activation_time, deactivation_time, smoothing)
-    return zajac_rate(u, a, activation_time, deactivation_time)
+    if form == ZAJAC:
+        return zajac_rate(u, a, activation_time, deactivation_time)
+    return math.nan
 
 
 @jit
 def advance(form, a, u, activation_time, deactivation_time, smoothing, duration):
-    """Return the activation after `duration` [s] under constant excitation u and either form."""
+    """Return the activation after `duration` [s] under constant excitation u and either form, NaN under another."""
     if form == SMOOTH:
         return advance_smooth(a, u, activation_time, deactivation_time, smoothing, duration)
-    return advance_activation(a, u, activation_time, deactivation_time, duration)
+    if form == ZAJAC:
+        return advance_activation(a, u, activation_time, deactivation_time, duration)
+    return math.nan
 
 
 # ------------------------------------------------------------------------------------ Zajac, MuJoCo

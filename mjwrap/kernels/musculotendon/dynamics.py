@@ -21,7 +21,7 @@ from mjwrap.kernels.musculotendon.fiber import (
     step_fiber,
     tendon_force,
 )
-from mjwrap.kernels.musculotendon.tension import DEGROOTE_FREGLY, MILLARD
+from mjwrap.kernels.musculotendon.table import has_fiber
 from mjwrap.kernels.musculotendon.tension import tension as law_tension
 
 # where a muscle's state comes from
@@ -74,12 +74,6 @@ def write_states(source, index, activation, fiber, act, own):
 
 
 @jit
-def has_fiber(law):
-    """Return whether a law knows a fibre and its tendon."""
-    return law in (DEGROOTE_FREGLY, MILLARD)
-
-
-@jit
 def is_elastic(law, params, m):
     """Return whether the fibre length of muscle m is a state."""
     return has_fiber(law) and params[m, ELASTIC] != 0.0
@@ -112,6 +106,10 @@ def drive_muscles(muscles, timing, start, states):
         if since <= 0.0:
             start.length[m] = length[m]
         states.activation[m], states.next_activation[m], next_fiber[m] = a, end, start.fiber[m]
+        if not math.isfinite(a + end):  # an unknown form of activation dynamics; a clamp would hide it
+            states.activation[m] = states.next_activation[m] = start.activation[m]
+            if status[m] <= lay.CONVERGED:
+                status[m] = lay.NON_FINITE
         if status[m] > lay.CONVERGED:
             continue
         status[m] = -status[m]

@@ -29,12 +29,17 @@ def _muscle_rate(ctrl, act, rise, fall, width):
 
 @jit
 def next_activation(dynamics, constants, m, act, ctrl, timestep):
-    """Return the activation of muscle m after one step [s]; constants (n, 5): dynprm (3), then limits (2)."""
+    """Return the activation of muscle m after one step [s]; constants (n, 5): dynprm (3), then limits (2).
+
+    NaN for dynamics that are not listed above.
+    """
     if dynamics == INTEGRATOR:
         following = act + ctrl * timestep
     elif dynamics == MUSCLE:
         rate = _muscle_rate(ctrl, act, constants[m, 0], constants[m, 1], constants[m, 2])
         following = act + rate * timestep
+    elif dynamics != FILTER and dynamics != FILTER_EXACT:
+        return math.nan
     else:
         time = max(MINVAL, constants[m, 0])
         rate = (ctrl - act) / time

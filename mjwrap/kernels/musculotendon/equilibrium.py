@@ -1,4 +1,4 @@
-"""Balance of fibre and tendon: a law's curves by its code, the forces and their slopes, and the search for the root.
+"""Balance of fibre and tendon: the forces and their slopes, and the search for the root.
 
 Lengths in l_o, velocities in v_max l_o, forces in F_max; tendon lengths in l_s.
 """
@@ -8,9 +8,13 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.musculotendon import degroote_fregly, millard
-
-MILLARD = millard.CODE
+from mjwrap.kernels.musculotendon.table import (
+    exponential_tendon,
+    law_balancing_velocity,
+    length_curves,
+    tendon_curve,
+    velocity_curve,
+)
 
 NORMAL = 0
 AT_MINIMUM = 1  # the fibre is at its minimum length, and does not balance the tendon
@@ -23,38 +27,10 @@ SMALL = 1e-6  # [l_s] largest such step of the tendon: the curvature of a tendon
 STRAINED = 1.08  # [l_s] tendon length from which at most the iteration starts
 # [F_max] imbalance above which an exponential tendon is taken by its logarithm, and what is added to the forces for it
 STEEP, OFFSET = 0.2, 0.2
-FASTEST = millard.FASTEST
+FASTEST = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
 
 
-# ------------------------------------------------------------------------------- a law's curves, by code
-
-
-@jit
-def length_curves(law, x):
-    """Return the active force-length curve, its slope, the passive one and its slope at fibre length x [l_o]."""
-    if law == MILLARD:
-        active, d_active = millard.active(x)
-        passive, d_passive = millard.passive(x)
-    else:
-        active, d_active = degroote_fregly.active(x)
-        passive, d_passive = degroote_fregly.passive(x)
-    return active, d_active, passive, d_passive
-
-
-@jit
-def velocity_curve(law, v):
-    """Return the force-velocity curve and its slope at fibre velocity v [v_max l_o]."""
-    if law == MILLARD:
-        return millard.velocity(v)
-    return degroote_fregly.velocity(v)
-
-
-@jit
-def inverse_velocity(law, force):
-    """Return the fibre velocity [v_max l_o] at which the force-velocity curve has a value."""
-    if law == MILLARD:
-        return millard.inverse_velocity(force)
-    return degroote_fregly.inverse_velocity(force)
+# --------------------------------------------------------------------------- balance of tendon and fibre
 
 
 @jit
@@ -67,24 +43,8 @@ def balancing_velocity(law, strength, damping, wanted, close):
         v = FASTEST if wanted > 0.0 else (-FASTEST if wanted < 0.0 else 0.0)
         force, slope = velocity_curve(law, v)
         return v, force, slope
-    if law == MILLARD:
-        v, force, slope = millard.balancing_velocity(strength, damping, wanted, close)
-    else:
-        v, force, slope = degroote_fregly.balancing_velocity(strength, damping, wanted, close)
+    v, force, slope = law_balancing_velocity(law, strength, damping, wanted, close)
     return min(max(v, -FASTEST), FASTEST), force, slope
-
-
-@jit
-def tendon_curve(law, x):
-    """Return the tendon's force [F_max] and its slope at tendon length x [l_s]: both zero where it is slack."""
-    if x <= 1.0:
-        return 0.0, 0.0
-    if law == MILLARD:
-        return millard.tendon(x)
-    return degroote_fregly.tendon(x)
-
-
-# --------------------------------------------------------------------------- balance of tendon and fibre
 
 
 @jit
@@ -171,7 +131,7 @@ def balance(law, activation, damping, height, ratio, reach, before, rate, low, h
         if off <= 0.0 and x <= least:
             return least, pull, k, AT_MINIMUM
         step = -off / slope if slope < 0.0 else 0.0
-        if off > STEEP and law != MILLARD and force >= 0.0:
+        if off > STEEP and exponential_tendon(law) and force >= 0.0:
             # the tendon's exponential outweighs all else: the logarithms of both forces are nearly straight
             bend = d_pull / (pull + OFFSET) - d_force / (force + OFFSET)
             step = -math.log((pull + OFFSET) / (force + OFFSET)) / bend if bend < 0.0 else 0.0

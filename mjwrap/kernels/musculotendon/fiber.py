@@ -20,11 +20,9 @@ from mjwrap.kernels.musculotendon.equilibrium import (
     SLACK_TENDON,
     balance,
     balancing_velocity,
-    length_curves,
     rest_imbalance,
-    tendon_curve,
-    velocity_curve,
 )
+from mjwrap.kernels.musculotendon.table import length_curves, tendon_curve, velocity_curve
 from mjwrap.kernels.musculotendon.third_order_step import advance_third_order
 
 # Columns of params: F_max [N], l_o [m], l_s [m], pennation at l_o [rad], v_max [l_o/s], fibre damping [F_max per v_max

@@ -14,9 +14,16 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.musculotendon import degroote_fregly, fiber, millard
+from mjwrap.kernels.musculotendon import fiber
 from mjwrap.kernels.musculotendon import tension as muscle
 from mjwrap.kernels.musculotendon.fiber import DAMPING, ELASTIC, F_MAX, HEIGHT, LEAST, OPTIMAL, SLACK, V_MAX
+from mjwrap.kernels.musculotendon.table import (
+    has_fiber,
+    length_curves,
+    passive_energy,
+    tendon_energy,
+    velocity_curve,
+)
 from mjwrap.kernels.musculotendon.umberger import metabolic_power
 
 # Rows of what `energetics` fills.
@@ -25,24 +32,6 @@ FIBER_VELOCITY, ACTIVE, PASSIVE, DAMPED, FIBER, TENDON, MUSCLE, UNBALANCED, TEND
 )
 ACTIVATION_HEAT, MAINTENANCE_HEAT, SHORTENING_HEAT, RESTING_HEAT, WORK, METABOLIC = range(10, 16)
 OUTPUTS = 16
-
-
-@jit
-def passive_energy(law, x):
-    """Return the energy of the parallel elastic element [F_max l_o] at fibre length x [l_o], zero where it is free."""
-    if law == millard.CODE:
-        return millard.passive_energy(x)
-    return degroote_fregly.passive_energy(x)
-
-
-@jit
-def tendon_energy(law, x):
-    """Return the energy of the tendon [F_max l_s] at its length x [l_s], zero where it is slack."""
-    if x <= 1.0:
-        return 0.0
-    if law == millard.CODE:
-        return millard.tendon_energy(x)
-    return degroote_fregly.tendon_energy(x)
 
 
 @jit
@@ -80,8 +69,8 @@ def powers(law, params, m, activation, length, speed, fiber_length, constants, e
         law, params, m, activation, length, speed, fiber_length
     )
     x, v = now / optimal, velocity / (params[m, V_MAX] * optimal)
-    multiplier, _, passive, _ = fiber.length_curves(law, x)
-    rate, _ = fiber.velocity_curve(law, v)
+    multiplier, _, passive, _ = length_curves(law, x)
+    rate, _ = velocity_curve(law, v)
     active = f_max * min(max(activation, 0.0), 1.0) * multiplier * rate
     passive *= f_max
     damped = f_max * params[m, DAMPING] * v
@@ -116,7 +105,7 @@ def energetics(law, params, activation, excitation, length, speed, fiber_length,
     """
     out[:] = 0.0
     for m in range(law.shape[0]):
-        if law[m] == muscle.DEGROOTE_FREGLY or law[m] == muscle.MILLARD:
+        if has_fiber(law[m]):
             powers(
                 law[m], params, m, activation[m], length[m], speed[m], fiber_length[m],
                 constants, excitation[m], out,

@@ -41,7 +41,7 @@ SHORTEST = 1e-150  # [m]
 def list_corner(k, node, i, stop):
     """Write normal, directions of sliding and curvatures at the corner of node k, whose P stands in stop i."""
     nx, ny, nz = normal(k, stop[i, D_P], stop[i, D_P + 1], stop[i, D_P + 2], node)
-    cylinder = node[k, lay.KIND] == lay.CYLINDER
+    cylinder = node[k, lay.INSIDE] == lay.ABOUT_AXIS
     x, y, z = node[k, lay.ROT + 2], node[k, lay.ROT + 5], node[k, lay.ROT + 8]
     if not cylinder:
         x, y, z = 0.0, 0.0, 0.0

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.geometry.clearance import dip
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
-from mjwrap.kernels.geometry.winding import branched, follow, swept
+from mjwrap.kernels.geometry.table import dip, swept
+from mjwrap.kernels.geometry.traits import branched, hollow
+from mjwrap.kernels.geometry.winding import follow
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, SLIPPED
 from mjwrap.kernels.wraps.single import wrap
 
-KIND, DIM, SIZE, POS = lay.KIND, lay.DIM, lay.SIZE, lay.POS
+SIZE, POS = lay.SIZE, lay.POS
 S_MODE, S_SWEEP, S_P, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_ARC
 W_P, W_Q = lay.W_P, lay.W_Q
 FREE, TOUCHED = lay.FREE, lay.TOUCHED
@@ -27,7 +28,7 @@ DEPTH = (
 @jit
 def _has_twin(k, hi, node):
     """Return whether the next row is the same surface once more."""
-    return k + 1 < hi and node[k + 1, lay.TWIN] != 0.0
+    return k + 1 < hi and node[k + 1, lay.TOUCH] != 0.0
 
 
 @jit
@@ -40,7 +41,7 @@ def follow_branch(lo, hi, node):
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED or node[k, S_ARC] < 0.0:
             continue
-        if branched(node[k, KIND]) and node[k, lay.TWIN] == 0.0:
+        if branched(k, node) and node[k, lay.TOUCH] == 0.0:
             angle = swept(k, node)
             if _has_twin(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
                 node[k, S_SWEEP] = angle
@@ -68,12 +69,6 @@ def drop(lo, hi, node):
             release(k, node)
             dropped += 1
     return dropped
-
-
-@jit
-def hollow(kind):
-    """Return whether a straight segment that is tangent to the surface may enter it elsewhere."""
-    return kind == lay.TORUS or kind == lay.CUSTOM
 
 
 @jit
@@ -184,7 +179,7 @@ def take_in(lo, hi, ends, node):
     status = lay.CONVERGED
     before = -1
     for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED and hollow(node[k, KIND]):
+        if node[k, S_MODE] == TOUCHED and hollow(k, node):
             if _dips(k, node, ends, x, y, z, node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]):
                 if _has_twin(k, hi, node) and node[k + 1, S_MODE] != TOUCHED:
                     _hand_over(k, node)
@@ -221,14 +216,9 @@ def in_range(lo, hi, ends, node):
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED:
             continue
-        kind = node[k, KIND]
-        if kind == lay.CUSTOM and node[k, lay.W_ANGLE] != 0.0:
+        if node[k, lay.W_OUT] != 0.0:
             return False
-        half = 1e300
-        if kind == lay.CYLINDER:
-            half = node[k, DIM + 1]
-        elif kind == lay.CONE or kind == lay.ELLIPTIC_CYLINDER:
-            half = node[k, DIM + 2]
+        half = node[k, lay.Z_LIMIT]
         if half < 1e300:
             x, y, z = (
                 node[k, W_Q] - node[k, W_P],

@@ -9,6 +9,7 @@ import numpy as np
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import allocating, jit
 from mjwrap.kernels.geometry.geodesics import displace
+from mjwrap.kernels.geometry.table import known
 from mjwrap.kernels.spans.cold_start import path_length
 from mjwrap.kernels.spans.end_inside import has_length
 from mjwrap.kernels.spans.large_moves import solve_span
@@ -35,8 +36,10 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     status, iterations, evaluations = lay.CONVERGED, 0, 0
     ax, ay, az = 0.0, 0.0, 0.0
     start = lo
+    strange = False  # whether the span has a surface of a kind that no kernel knows
     for k in range(lo, hi + 1):
         if k < hi and node[k, KIND] != lay.VIA:
+            strange = strange or not known(node[k, KIND])
             continue
         if k < hi:
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
@@ -47,6 +50,10 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
             status = lay.NON_FINITE
         elif start == k:
             total += straight
+        elif strange:
+            status = lay.UNKNOWN_SURFACE
+            total += straight
+            strange = False
         else:
             ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
             if node[start, lay.INSIDE] > 0.0:

@@ -25,49 +25,18 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, inlined, jit
-from mjwrap.kernels.geometry.projection import into_frame, project
-from mjwrap.kernels.geometry.quadric import inverse_squares, onto
+from mjwrap.kernels.geometry.projection import into_frame
+from mjwrap.kernels.geometry.table import nearest
+from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, list_segments
 from mjwrap.kernels.spans.cold_start import keep
 from mjwrap.kernels.spans.span import last_row, settle, take_back
 from mjwrap.kernels.tangency.newton import ON_SURFACE
-from mjwrap.kernels.wraps.single import closed_form, holds
+from mjwrap.kernels.wraps.single import holds
 
-KIND, POS, ROT, DIM, S_MODE = lay.KIND, lay.POS, lay.ROT, lay.DIM, lay.S_MODE
+KIND, POS, ROT, S_MODE = lay.KIND, lay.POS, lay.ROT, lay.S_MODE
 NOWHERE = 1e300  # the tangency error where nothing stands in
-STEPS = 60  # to the nearest point of an ellipsoid; five to ten are normal
 DEEPEST = 0.5  # least eigenvalue of I + h W: how deep an end may be below a surface on which it wraps
-OFF_AXIS = 1e-9  # least share of a semi-axis by which a point is taken to be off the middle plane
-
-
-@jit
-def _nearest_quadric(node, k, x, y, z):
-    """Return the point of an ellipsoid or elliptic cylinder nearest to a point inside it; frame S.
-
-    Each coordinate of it is a^2 x / (a^2 + s), where s < 0 makes the sum of squares over a^2 one. That sum is convex
-    and falls with s, so Newton's method comes to the root from the left without a safeguard.
-    """
-    a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
-    ia, ib, ic = inverse_squares(node, k)
-    if ic == 0.0:
-        c = 1.0
-    u, v, w = max(abs(x) / a, OFF_AXIS), max(abs(y) / b, OFF_AXIS), max(abs(z) / c, OFF_AXIS)
-    if ic == 0.0:
-        w = 0.0
-    s = max(a * a * (u - 1.0), b * b * (v - 1.0))
-    if ic > 0.0:
-        s = max(s, c * c * (w - 1.0))
-    p, q, r = u, v, w
-    for _ in range(STEPS):
-        fa, fb, fc = 1.0 / (1.0 + s * ia), 1.0 / (1.0 + s * ib), 1.0 / (1.0 + s * ic)
-        p, q, r = u * fa, v * fb, w * fc
-        rest = p * p + q * q + r * r - 1.0
-        move = 0.5 * rest / (p * p * ia * fa + q * q * ib * fb + r * r * ic * fc)
-        s += move
-        if rest <= 4e-16:
-            break
-    px, py = math.copysign(a * p, x), math.copysign(b * q, y)
-    return onto(ia, ib, ic, px, py, z if ic == 0.0 else math.copysign(c * r, z))
 
 
 @jit
@@ -76,10 +45,7 @@ def _foot(k, ends, column, node):
     x, y, z = into_frame(
         node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
     )
-    if node[k, KIND] == lay.ELLIPSOID or node[k, KIND] == lay.ELLIPTIC_CYLINDER:
-        x, y, z = _nearest_quadric(node, k, x, y, z)
-    else:
-        x, y, z, _, _, _ = project(node, k, x, y, z)
+    x, y, z = nearest(node, k, x, y, z)
     return (
         node[k, POS] + node[k, ROT] * x + node[k, ROT + 1] * y + node[k, ROT + 2] * z - ends[0],
         node[k, POS + 1] + node[k, ROT + 3] * x + node[k, ROT + 4] * y + node[k, ROT + 5] * z - ends[1],
@@ -147,7 +113,7 @@ def stand_in(lo, hi, ends, node, tol, direct):
     k, j = _contacts(lo, hi, node)
     leaves_a, leaves_b = a >= 0 and not a <= k < behind, b >= 0 and j < b
     # a search may find another wrap from one foot than from the next
-    good = (a < 0 or closed_form(node[a, KIND])) and (b < 0 or closed_form(node[b, KIND]))
+    good = (a < 0 or closed_form(a, node)) and (b < 0 or closed_form(b, node))
     good = good and (not leaves_a or a == lo)  # only the surface next to an end can be ignored
     good = good and (not leaves_b or last_row(b, hi, node) == hi)
     # one that leaves the foot and meets the same surface again, behind a hollow, is none of the ways that are known

@@ -13,10 +13,10 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
+from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.spans.cold_start import between, keep
 from mjwrap.kernels.spans.end_inside import stand_in
 from mjwrap.kernels.spans.span import any_in, last_row, restore, settle, take_back, wrap_lone
-from mjwrap.kernels.wraps.single import closed_form
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T
@@ -70,7 +70,7 @@ def _moved_far(lo, hi, ends, node):
     """Return whether a path just found is so far from the one before that it may have missed a surface or a side."""
     follows = False
     for k in range(lo, hi):
-        if closed_form(node[k, KIND]) or node[k, lay.TWIN] > 0.0:
+        if closed_form(k, node) or node[k, lay.TOUCH] > 0.0:
             continue
         follows = True
         if _shifted(k, node):
@@ -151,7 +151,7 @@ def _recover(lo, hi, ends, node, tol, direct, found):
     restore(lo, hi, ends, node)
     keep(lo, hi, node, W_START, False)
     for k in range(lo, hi):
-        if not closed_form(node[k, KIND]) and node[k, lay.TWIN] == 0.0:
+        if not closed_form(k, node) and node[k, lay.TOUCH] == 0.0:
             end = last_row(k, hi, node)
             evaluations += _stride(k, end, between(lo, hi, k, end, ends, node), node, tol)
     status, total, error, iterations, e = settle(lo, hi, ends, node, tol, direct)
@@ -183,7 +183,7 @@ def solve_span(lo, hi, ends, node, tol, direct):
     error and saved solution are those of what stands in for the path (`foot.py`).
     """
     warm = not any_in(lo, hi, node, COLD)
-    if direct and warm and hi - lo == 1 and closed_form(node[lo, KIND]):
+    if direct and warm and hi - lo == 1 and closed_form(lo, node):
         good, total, error = wrap_lone(lo, ends, node, tol)
         if good:
             return lay.CONVERGED, total, error, 0, 1

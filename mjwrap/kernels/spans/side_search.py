@@ -11,7 +11,8 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geometry.geodesics import geodesic
-from mjwrap.kernels.geometry.winding import TWO_PI, branched
+from mjwrap.kernels.geometry.traits import branched, closed_form, drawn_hints
+from mjwrap.kernels.geometry.winding import TWO_PI
 from mjwrap.kernels.spans.active_set import (
     MET,
     drop,
@@ -25,7 +26,6 @@ from mjwrap.kernels.spans.active_set import (
 from mjwrap.kernels.spans.cold_start import between, keep, path_length, relax
 from mjwrap.kernels.tangency.certify import minimal
 from mjwrap.kernels.tangency.newton import UNKNOWN, newton
-from mjwrap.kernels.wraps.single import closed_form
 
 KIND, SIZE, HINT = lay.KIND, lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
@@ -101,7 +101,7 @@ def _take_back(first, last, ends, node, column):
 def _flips(k, node):
     """Return whether obstacle k may be passed on its other side: a topological one, known in closed form, that no hint
     chooses, and that is swept by so much that the other way can be shorter, or touched beyond its end."""
-    if not (branched(node[k, KIND]) and closed_form(node[k, KIND])) or node[k, HINT] > 0.0:
+    if not (branched(k, node) and closed_form(k, node)) or node[k, HINT] > 0.0:
         return False
     if node[k, S_MODE] != TOUCHED:
         return False
@@ -111,9 +111,18 @@ def _flips(k, node):
 @jit
 def _searchable(k, node):
     """Return whether another wrap of obstacle k can be looked for: it is touched, and no hint chooses its side."""
-    if closed_form(node[k, KIND]) or node[k, HINT] > 0.0 or node[k, lay.TWIN] > 0.0:
+    if closed_form(k, node) or node[k, HINT] > 0.0 or node[k, lay.TOUCH] > 0.0:
         return False
     return node[k, S_MODE] == TOUCHED
+
+
+@jit
+def _release_further(k, node):
+    """Let go of the further touches of the surface whose first row is k."""
+    k += 1
+    while k < node.shape[0] and node[k, lay.TOUCH] > 0.0:
+        release(k, node)
+        k += 1
 
 
 @jit
@@ -124,17 +133,16 @@ def _other_way(first, last, node):
             node[j, S_SWEEP] -= math.copysign(TWO_PI, node[j, S_SWEEP])
         elif _searchable(j, node):
             node[j, S_MODE] = COLD
-            if j + 1 < node.shape[0] and node[j + 1, lay.TWIN] > 0.0:
-                release(j + 1, node)
+            _release_further(j, node)
 
 
 @jit
 def _whole(lo, hi, first, last, node):
     """Return the rows first..last within lo..hi, and those that belong to the same surfaces."""
     first, last = max(lo, first), min(hi, last)
-    if node[first, lay.TWIN] > 0.0:
+    while node[first, lay.TOUCH] > 0.0:
         first -= 1
-    if last < hi and node[last, lay.TWIN] > 0.0:
+    while last < hi and node[last, lay.TOUCH] > 0.0:
         last += 1
     return first, last
 
@@ -186,11 +194,10 @@ def _chance(pattern, k, of):
 @jit
 def _draw_hint(k, node, pattern, place_in_row):
     """Start obstacle k from nothing with a hint drawn by chance, or leave it untouched."""
-    if k + 1 < node.shape[0] and node[k + 1, lay.TWIN] > 0.0:
-        release(k + 1, node)
+    _release_further(k, node)
     if _chance(pattern, place_in_row, 0) < PASSED_BY:
         release(k, node)
-        if closed_form(node[k, KIND]):
+        if closed_form(k, node):
             node[k, S_MODE] = COLD
         return
     node[k, S_MODE] = COLD
@@ -208,14 +215,16 @@ def _draw_hint(k, node, pattern, place_in_row):
 @jit
 def _throwable(k, node):
     """Return whether a string may be thrown over obstacle k: no hint chooses its side."""
-    return node[k, HINT] == 0.0 and node[k, lay.TWIN] == 0.0 and node[k, KIND] != lay.CUSTOM
+    return node[k, HINT] == 0.0 and node[k, lay.TOUCH] == 0.0 and drawn_hints(k, node)
 
 
 @jit
 def _past(k, hi, node):
     """Return the row of the next surface after row k."""
     k += 1
-    return k + 1 if k < hi and node[k, lay.TWIN] > 0.0 else min(k, hi)
+    while k < hi and node[k, lay.TOUCH] > 0.0:
+        k += 1
+    return min(k, hi)
 
 
 @jit

@@ -13,7 +13,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
-from mjwrap.kernels.geometry.winding import branched
+from mjwrap.kernels.geometry.traits import branched, closed_form, one_sided
 from mjwrap.kernels.spans.active_set import (
     MEETING,
     MET,
@@ -28,7 +28,7 @@ from mjwrap.kernels.spans.cold_start import keep, path_length, relax
 from mjwrap.kernels.spans.side_search import search_rows, shorten
 from mjwrap.kernels.tangency.certify import minimal, slip
 from mjwrap.kernels.tangency.newton import GEODESICS, ON_SURFACE, UNKNOWN, connect, newton
-from mjwrap.kernels.wraps.single import closed_form, holds, wrap
+from mjwrap.kernels.wraps.single import holds, wrap
 
 HINT, S_MODE, W_OLD, W_Y, W_FRESH = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Y, lay.W_FRESH
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
@@ -61,7 +61,7 @@ def _passes(lo, hi, node):
     if hi - lo == 1:
         return 1
     for k in range(lo, hi):
-        if not closed_form(node[k, lay.KIND]):
+        if not closed_form(k, node):
             return COLD_PASSES - 1
     return COLD_PASSES
 
@@ -70,7 +70,7 @@ def _passes(lo, hi, node):
 def _all_hinted(lo, hi, node):
     """Return whether hints choose the side of every obstacle."""
     for k in range(lo, hi):
-        if node[k, HINT] <= 0.0 and node[k, lay.TWIN] == 0.0 and node[k, lay.KIND] != lay.SPHERE:
+        if node[k, HINT] <= 0.0 and node[k, lay.TOUCH] == 0.0 and not one_sided(k, node):
             return False
     return True
 
@@ -98,7 +98,7 @@ def _start_afresh(lo, hi, cold, node):
     A warm start keeps its topological sides; what it loses is a minimum that has ceased to exist.
     """
     for k in range(lo, hi):
-        if cold or not branched(node[k, lay.KIND]):
+        if cold or not branched(k, node):
             node[k, S_MODE] = COLD
             node[k, HINT] = -abs(node[k, HINT])
 
@@ -127,7 +127,10 @@ def _slip_off(lo, hi, ends, node, sign):
 @jit
 def last_row(k, hi, node):
     """Return the row behind the last one of row k's surface."""
-    return k + 2 if k + 1 < hi and node[k + 1, lay.TWIN] > 0.0 else k + 1
+    k += 1
+    while k < hi and node[k, lay.TOUCH] > 0.0:
+        k += 1
+    return k
 
 
 @jit
@@ -204,12 +207,12 @@ def settle(lo, hi, ends, node, tol, direct):
         evaluations += search_rows(lo, hi, ends, node, COLD_PASSES)
     elif cold or (direct and hi - lo == 1):
         evaluations += relax(lo, hi, ends, node, _passes(lo, hi, node), False)
-        if cold and hi - lo == 1 and closed_form(node[lo, lay.KIND]):
+        if cold and hi - lo == 1 and closed_form(lo, node):
             evaluations += shorten(lo, hi, ends, node, 1)
     if cold:
         _remember(lo, hi, node)
     fresh = GEODESICS if cold or (direct and hi - lo == 1) else UNKNOWN
-    if cold and hi - lo == 1 and node[lo, W_FRESH] >= 0.0 and not closed_form(node[lo, lay.KIND]):
+    if cold and hi - lo == 1 and node[lo, W_FRESH] >= 0.0 and not closed_form(lo, node):
         fresh = node[lo, W_FRESH]
     settled = False
     changes = 0

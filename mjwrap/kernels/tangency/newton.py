@@ -12,7 +12,8 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, inlined, jit
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
-from mjwrap.kernels.geometry.projection import into_frame, project
+from mjwrap.kernels.geometry.projection import into_frame
+from mjwrap.kernels.geometry.table import project
 
 S_MODE, S_P, S_ARC = lay.S_MODE, lay.S_P, lay.S_ARC
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ

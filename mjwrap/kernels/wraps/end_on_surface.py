@@ -13,8 +13,9 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
-from mjwrap.kernels.geometry.projection import height, project, turn_into_frame
+from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
+from mjwrap.kernels.geometry.table import height, project
 from mjwrap.kernels.geometry.vectors import unit
 from mjwrap.kernels.tangency.certify import minimal
 from mjwrap.kernels.tangency.newton import UNKNOWN, newton

@@ -14,9 +14,9 @@ import numpy as np
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.geometry.clearance import bounding_radius
-from mjwrap.kernels.geometry.projection import height, project
 from mjwrap.kernels.geometry.stoermer import carray, stack
+from mjwrap.kernels.geometry.table import bounding_radius, height, project
+from mjwrap.kernels.geometry.traits import ellipse_sections
 from mjwrap.kernels.geometry.vectors import unit
 
 KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
@@ -176,7 +176,7 @@ def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
 
     u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest.
     """
-    if node[k, KIND] == lay.ELLIPSOID:
+    if ellipse_sections(k, node):
         return _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size)
     memory = carray(stack(), (80,))
     top, chain = memory[0:COLUMNS], memory[COLUMNS : 2 * COLUMNS]
@@ -203,7 +203,7 @@ def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
         x, y = first + 0.5 * (i + o) * step, 0.5 * (top[i] + top[o])
         px, py, pz = ax + x * ux + y * wx, ay + x * uy + y * wy, az + x * uz + y * wz
         if i - o > 2 and height(node, k, px, py, pz) > BRIDGE * node[k, SIZE]:
-            if node[k, lay.TWIN] == 0.0:
+            if node[k, lay.TOUCH] == 0.0:
                 stop = j
                 break
             start = j

@@ -144,7 +144,7 @@ def normal(k, x, y, z, node):
     """Return the outward unit normal at a point of the surface given from its origin, both in world directions."""
     along = 0.0
     ux, uy, uz = node[k, lay.ROT + 2], node[k, lay.ROT + 5], node[k, lay.ROT + 8]
-    if node[k, lay.KIND] == lay.CYLINDER:
+    if node[k, lay.INSIDE] == lay.ABOUT_AXIS:
         along = ux * x + uy * y + uz * z
     over = 1.0 / node[k, lay.DIM]
     return (x - along * ux) * over, (y - along * uy) * over, (z - along * uz) * over
@@ -162,7 +162,7 @@ def hold_inside(k, ends, node, tol):
     bx, by, bz = ends[6] - x, ends[7] - y, ends[8] - z
     radius = node[k, lay.DIM]
     over = 1.0 / radius
-    if node[k, lay.KIND] == lay.SPHERE:
+    if node[k, lay.INSIDE] == lay.ABOUT_POINT:
         reach = math.sqrt(ax * ax + ay * ay + az * az)
         unit = 1.0 / max(reach, 1e-300)
         ux, uy, uz = ax * unit, ay * unit, az * unit

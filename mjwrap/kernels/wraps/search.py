@@ -14,11 +14,11 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.geometry.clearance import dip, tube_angle, tube_crossing
 from mjwrap.kernels.geometry.geodesics import geodesic
-from mjwrap.kernels.geometry.projection import project
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.winding import follow, swept
+from mjwrap.kernels.geometry.table import dip, project, straight_swept, swept
+from mjwrap.kernels.geometry.traits import branched, hollow
+from mjwrap.kernels.geometry.winding import follow
 from mjwrap.kernels.tangency.newton import GEODESICS, UNKNOWN
 from mjwrap.kernels.wraps.end_on_surface import (
     beside,
@@ -31,21 +31,13 @@ from mjwrap.kernels.wraps.end_on_surface import (
 from mjwrap.kernels.wraps.half_planes import across, guess, place, place_on_tube
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, INSIDE, set_free
 
-KIND, DIM, SIZE, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.HINT
+SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 DIRECTIONS = 12  # half planes around AB
 DEPTH = 1e-10  # a segment that dips less below a surface, in its size, is clear of it
 SAME_BRANCH = 1.0  # difference of swept angles [rad] that is no whole turn
-
-
-@jit
-def _straight_sweep(k, node, ax, ay, az, bx, by, bz):
-    """Return the angle that the straight segment sweeps about the middle of a torus' tube [rad]."""
-    major = node[k, DIM]
-    turns = tube_crossing(major, ax, ay, az, bx, by, bz)
-    return tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az) + 2.0 * math.pi * turns
 
 
 @jit
@@ -80,13 +72,13 @@ def wrap_searched(k, ends, node, search):
     high_b, bx, by, bz, rx, ry, rz = moved_onto(k, node, ends, 6, False)
     low = (INSIDE - 1.0) * node[k, SIZE]
     inside = (A_INSIDE if high_a < low else 0) + (B_INSIDE if high_b < low else 0)
-    if node[k, lay.TWIN] != 0.0:  # the string comes from the surface itself
+    if node[k, lay.TOUCH] != 0.0:  # the string comes from the surface itself
         high_a = math.inf
-    elif k + 1 < node.shape[0] and node[k + 1, lay.TWIN] != 0.0 and node[k + 1, S_MODE] == TOUCHED:
+    elif k + 1 < node.shape[0] and node[k + 1, lay.TOUCH] != 0.0 and node[k + 1, S_MODE] == TOUCHED:
         high_b = math.inf
     ends = (ends[0], ends[1], ends[2], qx, qy, qz, rx, ry, rz)
     mode, before = node[k, S_MODE], node[k, S_SWEEP]
-    winds = node[k, KIND] == lay.TORUS and node[k, lay.TWIN] == 0.0
+    winds = branched(k, node) and node[k, lay.TOUCH] == 0.0
     branch = winds and mode != COLD
     if mode == TOUCHED:
         for i in range(lay.STATE):
@@ -98,11 +90,11 @@ def wrap_searched(k, ends, node, search):
     dx, dy, dz = bx - ax, by - ay, bz - az
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     low, share = dip(node, k, ax, ay, az, bx, by, bz)
-    straight = _straight_sweep(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
+    straight = straight_swept(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
     hooked = branch and abs(straight - follow(straight, before)) > SAME_BRANCH
     hinted = mode == COLD and node[k, HINT] > 0.0
     if low >= -DEPTH * node[k, SIZE] and not hooked:
-        if hinted and node[k, KIND] >= lay.TORUS and node[k, KIND] != lay.CAPSULE:
+        if hinted and hollow(k, node):
             place(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
             good, _ = polish_beside(k, ends, node, high_a, high_b)
             if good:
@@ -142,7 +134,7 @@ def _search(
     else:
         wx, wy, wz = wx / length, wy / length, wz / length
     vx, vy, vz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    winds = node[k, KIND] == lay.TORUS and node[k, lay.TWIN] == 0.0
+    winds = branched(k, node) and node[k, lay.TOUCH] == 0.0
     found, best, fresh = False, 0.0, -1
     guessed = False
     j = 0

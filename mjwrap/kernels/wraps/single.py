@@ -15,13 +15,16 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.geometry.geodesics import geodesic
-from mjwrap.kernels.geometry.projection import height, into_frame, turn_into_frame
+from mjwrap.kernels.geometry.projection import into_frame, turn_into_frame
+from mjwrap.kernels.geometry.table import height
+from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.geometry.winding import tangents_sweep
 from mjwrap.kernels.wraps.ruled import (
     A_INSIDE,
     B_INSIDE,
     CLEAR,
     INSIDE,
+    SLIPPED,
     set_free,
     wrap_cone,
     wrap_cylinder,
@@ -100,12 +103,6 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
 # ----------------------------------------------------------------------------------------- dispatch
 
 
-@jit
-def closed_form(kind):
-    """Return whether a surface's wrap is known in closed form."""
-    return kind <= lay.SPHERE or kind == lay.CONE or kind == lay.ELLIPTIC_CYLINDER
-
-
 @apart
 def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
@@ -113,20 +110,23 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED
     summed, or 0. search: look for another side where a contact is lost, on surfaces without a closed form.
     """
-    kind = node[k, KIND]
-    if not closed_form(kind):
+    if not closed_form(k, node):
         return wrap_searched(k, (base_x, base_y, base_z, ax, ay, az, bx, by, bz), node, search)
     x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z
     px, py, pz = turn_into_frame(node, k, ax - x, ay - y, az - z)
     qx, qy, qz = turn_into_frame(node, k, bx - x, by - y, bz - z)
+    kind = node[k, KIND]
     if kind == lay.CYLINDER:
         inside = wrap_cylinder(k, px, py, pz, qx, qy, qz, node)
     elif kind == lay.SPHERE:
         inside = _wrap_sphere(k, px, py, pz, qx, qy, qz, node)
     elif kind == lay.CONE:
         inside = wrap_cone(k, px, py, pz, qx, qy, qz, node)
-    else:
+    elif kind == lay.ELLIPTIC_CYLINDER:
         inside = wrap_elliptic_cylinder(k, px, py, pz, qx, qy, qz, node)
+    else:  # a row whose trait has no wrap to it
+        inside = SLIPPED
+        set_free(node, k, 0.0)
     if node[k, S_MODE] == lay.TOUCHED:
         geodesic(k, node, base_x, base_y, base_z)
     return inside

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
-from mjwrap.kernels.musculotendon.tension import MUJOCO
+from mjwrap.kernels.musculotendon.table import MUJOCO
 from mjwrap.mjcf import MuscleDeclaration, Node
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks.follow import BIAS, BINDING, CONTROL, DRIVE, POINTERS, REGION
 from mjwrap.plugin.mujoco_c.fingerprint import buffer_layout
 from mjwrap.plugin.mujoco_c.offsets import check_pointer
-from mjwrap.surfaces import Capsule, Cylinder, Sphere
+from mjwrap.surfaces.rows import surface_rows
 
 Words = NDArray[np.int64]
 _MUSCLE_BIAS = int(mujoco.mjtBias.mjBIAS_MUSCLE)
@@ -116,13 +116,13 @@ def _bind_surface(lists: _Lists, k: int, node: Node) -> None:
     """Bind the sizes of node k to its geom where they are the geom's as they stand, else watch them."""
     if node.sizes >= 0 or node.surface is None:
         return  # the numerics are watched together
-    if not isinstance(node.surface, Sphere | Cylinder | Capsule):
+    if not node.surface.geom_columns:
         lists.watch("geom_size", node.geom, 1)
         return
-    first = k * layout.ROW
-    sized = sum(np.isfinite(node.surface.dims))  # a cylinder's half length is infinite unless it is declared
-    lists.bind("geom_size", node.geom, 0, int(sized), bk.A_NODE, first + layout.DIM)
-    lists.bind("geom_size", node.geom, 0, 1, bk.A_NODE, first + layout.SIZE)
+    row = surface_rows(node.surface)[0]
+    for size, column in node.surface.geom_columns:
+        if np.isfinite(row[column]):  # a cylinder's half length is infinite unless it is declared
+            lists.bind("geom_size", node.geom, size, 1, bk.A_NODE, k * layout.ROW + column)
 
 
 def watch(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> Watch:
@@ -134,7 +134,7 @@ def watch(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -
         drives[m] = _drive(lists, plan, m, muscle.actuator)
         for node in (node for route in muscle.routes for node in route.nodes):
             _bind_surface(lists, k, node)
-            k += 2 if node.surface is not None and node.surface.hollow else 1
+            k += 1 if node.surface is None else node.surface.touches
     lists.watch("numeric_data")
     derived = lists.take()
     for name, rows in lists.plain.items():

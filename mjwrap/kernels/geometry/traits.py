@@ -1,0 +1,47 @@
+"""What is true of a row's surface: questions that the solver asks, answered by the row's column TRAITS.
+
+The class of the surface says it (`mjwrap/surfaces/surface.py`); no kernel concludes it from the kind.
+"""
+
+from __future__ import annotations
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+
+TRAITS = lay.TRAITS
+
+
+@jit
+def closed_form(k, node):
+    """Return whether the wrap of row k's surface between two points is known in closed form."""
+    return int(node[k, TRAITS]) & lay.CLOSED_FORM != 0
+
+
+@jit
+def branched(k, node):
+    """Return whether the side on which a string passes the surface is topological, and S_SWEEP holds it."""
+    return int(node[k, TRAITS]) & lay.BRANCHED != 0
+
+
+@jit
+def hollow(k, node):
+    """Return whether a straight segment that is tangent to the surface may enter it elsewhere."""
+    return int(node[k, TRAITS]) & lay.HOLLOW != 0
+
+
+@jit
+def one_sided(k, node):
+    """Return whether no two points have more than one stable wrap of the surface between them."""
+    return int(node[k, TRAITS]) & lay.ONE_SIDED != 0
+
+
+@jit
+def drawn_hints(k, node):
+    """Return whether a cold start may throw strings over the surface, with hints drawn by chance."""
+    return int(node[k, TRAITS]) & lay.DRAWN_HINTS != 0
+
+
+@jit
+def ellipse_sections(k, node):
+    """Return whether the surface is the unit sphere stretched by DIM, and its plane sections are ellipses."""
+    return int(node[k, TRAITS]) & lay.ELLIPSE_SECTIONS != 0

@@ -1,0 +1,59 @@
+"""The kernels' rows of a surface: the one place where a class becomes columns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import GeometryError
+from mjwrap.kernels import layout
+from mjwrap.kernels.geometry.table import known
+from mjwrap.surfaces.surface import Surface
+
+Array = NDArray[np.float64]
+
+
+def traits(surface: Surface) -> int:
+    """Return the sum of the trait bits of a surface, as `mjwrap/kernels/layout.py` lists them."""
+    return (
+        layout.CLOSED_FORM * surface.closed_form
+        + layout.BRANCHED * surface.branched
+        + layout.HOLLOW * (surface.touches > 1)
+        + layout.ONE_SIDED * surface.one_sided
+        + layout.DRAWN_HINTS * surface.drawn_hints
+        + layout.ELLIPSE_SECTIONS * surface.ellipse_sections
+    )
+
+
+def write_surface(surface: Surface, rows: Array) -> None:
+    """Write a surface to all rows (n, ROW): kind, sizes and traits, not pose, touch number and saved solution.
+
+    `GeometryError` for a kind that the kernels do not know.
+    """
+    name, kind, columns = type(surface).__name__, getattr(surface, "kind", None), surface.columns
+    if kind is None or not known(kind):
+        raise GeometryError(
+            f"{name}: the kernels know no surface of kind {kind!r}; kinds are listed in mjwrap/kernels/layout.py"
+        )
+    if len(columns) > layout.SIZE - layout.DIM:
+        raise GeometryError(
+            f"{name}: {len(columns)} numbers do not fit into {layout.SIZE - layout.DIM} columns"
+        )
+    rows[:, layout.KIND] = kind
+    rows[:, layout.DIM : layout.SIZE] = (*columns, *[0.0] * (layout.SIZE - layout.DIM - len(columns)))
+    rows[:, layout.SIZE] = surface.size
+    rows[:, layout.TRAITS] = traits(surface)
+    rows[:, layout.Z_LIMIT] = surface.z_limit
+
+
+def surface_rows(surface: Surface, inside: bool = False) -> Array:
+    """Return the rows (touches, ROW) of a surface, cold, without a pose and a hint.
+
+    inside: the string is held to the solid. `GeometryError` as of `write_surface`.
+    """
+    rows = np.zeros((surface.touches, layout.ROW))
+    write_surface(surface, rows)
+    rows[:, layout.S_MODE] = layout.COLD
+    rows[:, layout.TOUCH] = np.arange(surface.touches)
+    rows[:, layout.INSIDE] = surface.held_about if inside else 0.0
+    return rows
