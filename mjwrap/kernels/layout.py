@@ -45,7 +45,7 @@ NO_GEODESIC = 7
 # ------------------------------------------------------------------------ columns of the saved solution
 S_MODE = 22  # COLD, FREE or TOUCHED
 S_SWEEP = 23  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
-S_P = 24  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts, see `jumps.py`
+S_P = 24  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts
 S_T = 27  # unit tangent at P in S (3); FREE, no closed form: where the straight segment ends [m]; zeros: not known
 S_ARC = 30  # arc length s [m]
 S_BEFORE = (
@@ -71,11 +71,11 @@ W_KQ = 60  # kappa, tau, beta at Q
 W_JAC = 63  # Jacobi fields a, a', r, r' at Q
 W_E = 67  # unit vector of the straight segment that arrives at P (3)
 W_L = 70  # its length [m]
-W_CP = 71  # e.t, e.n, e.b at P (3)
-W_CQ = 74  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves
+W_CP = 71  # e.t, e.n, e.b at P (3): the last two are rows 0 and 1 of the path error h
+W_CQ = 74  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves: the last two are rows 2 and 3 of h
 W_LQ = 77  # length of the segment that leaves [m]
 W_EQ = 78  # its unit vector (3)
-W_Y = 81  # block elimination: solution for the right-hand side (4)
+W_Y = 81  # block elimination: solution for the right-hand side, in the end the Newton step d0..d3 (4)
 W_X = 85  # block elimination: solution for the upper coupling (4 x 2)
 W_SAVE = 93  # P, t, s before a trial step (7)
 W_OLD = 100  # the saved solution from which the solve started (11)
@@ -92,9 +92,11 @@ W_START = 138  # the saved solution from which a solve over a large move started
 W_LOW = 149  # height of the lowest point of a free string over the surface [m]
 W_FIRST = 150  # in a span's first row: ||f||^2 of the contacts from which it started; -1 where they are not evaluated
 W_REPAIRS = 151  # in a span's first row: how often the path was begun anew, from another start or in strides
-W_PIN = 152  # 1 where Q is at the path's last point, which lies on the surface; 0 else
-W_LAND = 153  # 1 while Q is to go there, however far it is; 0 else
-INSIDE = 154  # 1 where the string is held to the solid, alone between two fixed points (`inside.py`); 0 else
+W_PIN = 152  # 1 where the path ends on the surface, at Q: then h holds components of Q - B; 0 else
+W_LAND = 153  # 1 while Q is to go to that end, however far it is (`end_on_surface.py`); 0 else
+INSIDE = (
+    154  # 1 where the string is held to the solid, alone between two fixed points (`held_inside.py`); 0 else
+)
 ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`
