@@ -14,7 +14,7 @@ from derivative_scenes import SURFACES, Array, exponential
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import geodesics
-from mjwrap.kernels.solved import hessian
+from mjwrap.kernels.solved import contact_rates, hessian
 from mjwrap.kernels.tangency import newton
 from mjwrap.paths.scene import pack
 from mjwrap.verification.scenes import rotation
@@ -118,7 +118,8 @@ def derivatives_of(path: Laid, direction: Array) -> tuple[Array, Array] | None:
     hessian.add_stiffness_times(count, direction, points, rate)
     rate[:, 3:] -= 0.5 * np.cross(path.state()[0][:, 3:], direction[:, 3:])
     assert (
-        hessian.contact_rates(count, direction, np.ones(slots - 2), points, contacts)[0] == hessian.NO_FAULT
+        contact_rates.contact_rates(count, direction, np.ones(slots - 2), points, contacts)[0]
+        == hessian.NO_FAULT
     )
     return rate, contacts
 

@@ -1,6 +1,6 @@
-"""Ends inside a surface: what stands in for the path that does not exist goes on from it, and has an exact gradient.
+"""Ends inside a surface: the substitute path is continuous with the path outside, and has an exact gradient.
 
-The foot of an end is the surface point nearest to it, so an end is put at a height over a random point, along the
+The foot point of an end is the surface point nearest to it, so an end is put at a height over a random point, along the
 normal there. Everything is measured against differences of lengths.
 """
 

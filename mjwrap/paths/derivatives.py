@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError, PathError
 from mjwrap.kernels import layout
-from mjwrap.kernels.solved import hessian
+from mjwrap.kernels.solved import contact_rates, hessian
 from mjwrap.paths.scene import Array, Point, vector
 from mjwrap.paths.status import Status
 
@@ -153,7 +153,7 @@ class Derivatives:
         twist = self._twists(origin_velocity, insertion_velocity, twists)
         rates = np.zeros((len(self._node), 7))
         size = np.ascontiguousarray(self._node[:, layout.SIZE])
-        self._raise("contact velocities", *hessian.contact_rates(count, twist, size, points, rates))
+        self._raise("contact velocities", *contact_rates.contact_rates(count, twist, size, points, rates))
         found: list[ContactVelocity] = []
         for row, k in enumerate(self._owner):
             one = self._contact_velocity(row, twist[k + 1], rates[row])

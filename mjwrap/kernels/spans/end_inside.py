@@ -36,9 +36,7 @@ from mjwrap.kernels.wraps.single import closed_form, contains
 KIND, POS, ROT, DIM, S_MODE = lay.KIND, lay.POS, lay.ROT, lay.DIM, lay.S_MODE
 NO_SUBSTITUTE = 1e300  # the tangency error where there is no substitute path
 STEPS = 60  # to the nearest point of an ellipsoid; five to ten are normal
-LEAST_EIGENVALUE = (
-    0.5  # least eigenvalue of I + h W: how deep an end may be below a surface on which it wraps
-)
+LEAST_EIGENVALUE = 0.5  # of I + h W: how deep an end may be below a surface on which the string wraps
 OFF_MIDDLE_PLANE = 1e-9  # least share of a semi-axis by which a point is taken to be off the middle plane
 
 
@@ -190,7 +188,7 @@ def substitute_path(lo, hi, ends, node, tol, direct):
             status, length, off, i, e = solve_active_set(first, last, part, node, tol, direct)
             iterations += i
             evaluations += e
-        # where the string leaves F at once, the way through is what the path outside goes on as: it has to be known
+        # where the string leaves F at once, the path outside goes on as the way through, which has to be known
         if status != lay.CONVERGED and ((over_a and leaves_a) or (over_b and leaves_b)):
             return best, NO_SUBSTITUTE, iterations, evaluations
         if status == lay.CONVERGED and length > best:

@@ -65,8 +65,8 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
         return principal
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
-    foot = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    cx, cy = ax + foot * dx, ay + foot * dy
+    share = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    cx, cy = ax + share * dx, ay + share * dy
     if cx * cx + cy * cy > radius * radius and cx * hint_x + cy * hint_y >= 0.0:
         return principal
     turn = 1.0 if principal >= 0.0 else -1.0
