@@ -55,9 +55,8 @@ def residual(node: Array, ends: tuple[float, ...]) -> Array:
 def displaced(node: Array, k: int, column: int, size: float) -> Array:
     """Return the rows with obstacle k moved by one natural variation."""
     moved = node.copy()
-    variation = np.zeros(4)
-    variation[column] = size
-    geodesics.displace(k, *variation, moved)
+    slide, shift, turn, lengthen = (size * (i == column) for i in range(4))
+    geodesics.displace(k, slide, shift, turn, lengthen, moved)
     return moved
 
 
