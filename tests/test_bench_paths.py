@@ -192,13 +192,13 @@ def test_timed_kernels_compute_what_they_would_untimed(bench: Any, scenes: Any) 
     at = profile.solved(scene)
     node, first = at.node, at.touched[0]
     assert {type(scene.surfaces[at.owner[k]]) for k in at.touched} == {mw.Cylinder, mw.Ellipsoid, mw.Torus}
-    profile.newton.evaluate(0, len(node), at.ends, node)
+    profile.tangency_error.evaluate(0, len(node), at.ends, node)
     before, info = node.copy(), np.zeros((1, profile.layout.INFO))
     profile._evaluations(3, first, profile.NOTHING, at.ends, node)
     profile._minima(3, first, profile.NOTHING, node)
     for k in at.touched:
         profile._geodesics(3, k, profile.NOTHING, 0.0, node)
-    profile.newton.evaluate(0, len(node), at.ends, node)
+    profile.tangency_error.evaluate(0, len(node), at.ends, node)
     assert np.array_equal(node, before)
     profile._solutions(3, profile.NOTHING, at.outside, node, info)
     path = slice(profile.layout.S_MODE, profile.layout.S_MODE + profile.layout.STATE)

@@ -179,7 +179,7 @@ def test_normal_turns_with_the_shape_operator(surface: CustomSurface) -> None:
 
 
 def test_jacobi_fields_match_neighbouring_geodesics(surface: CustomSurface) -> None:
-    """Q and t_Q as docs/derivation.md has them: shift along b carries a, turning about n carries r."""
+    """Columns of dQ and dt_Q in the natural variations (docs/derivation.md): shift carries a, turn carries r."""
     rng = np.random.default_rng(8)
     for _ in range(CASES):
         node = random_rows(surface, 1, rng)

@@ -14,7 +14,7 @@ from derivative_scenes import SURFACES, Array, exponential
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import geodesics, table
-from mjwrap.kernels.solved import hessian
+from mjwrap.kernels.solved import contact_rates, hessian
 from mjwrap.kernels.tangency import newton
 from mjwrap.paths.scene import pack
 from mjwrap.verification.scenes import rotation
@@ -50,20 +50,20 @@ class Laid:
         shift = step * direction[[0, -1], :3]
         return Laid(node, self.origin + shift[0], self.insertion + shift[1]).solved()
 
-    def stops(self) -> tuple[int, int, Array]:
+    def points(self) -> tuple[int, int, Array]:
         """Return number of stops, fault, and stops, as the kernels have them."""
-        stop = np.empty((len(self.node) + 2, hessian.STOP))
+        points = np.empty((len(self.node) + 2, hessian.POINT_ROW))
         (ax, ay, az), (bx, by, bz) = self.origin, self.insertion
-        count, fault, _ = hessian.list_stops(
-            0, len(self.node), ax, ay, az, bx, by, bz, self.node, np.arange(len(self.node)), stop
+        count, fault, _ = hessian.list_path_points(
+            0, len(self.node), ax, ay, az, bx, by, bz, self.node, np.arange(len(self.node)), points
         )
-        return count, fault, stop
+        return count, fault, points
 
     def state(self) -> tuple[Array, Array]:
         """Return the gradient (n + 2, 6), and P, Q, s of every obstacle (n, 7)."""
-        count, _, stop = self.stops()
+        count, _, points = self.points()
         gradient = np.zeros((len(self.node) + 2, 6))
-        hessian.add_gradient(count, stop, gradient)
+        hessian.add_gradient(count, points, gradient)
         contacts = self.node[:, CONTACTS] + np.tile(self.origin, 2)
         return gradient, np.c_[contacts, self.node[:, lay.S_ARC]]
 
@@ -110,14 +110,17 @@ def lay_path(rng: np.random.Generator, kinds: str) -> Laid:
 
 def derivatives_of(path: Laid, direction: Array) -> tuple[Array, Array] | None:
     """Return the rates along a direction of what `state` returns, or None for a string that slips off."""
-    count, fault, stop = path.stops()
-    if fault != hessian.SOUND:
+    count, fault, points = path.points()
+    if fault != hessian.NO_FAULT:
         return None
     slots = len(path.node) + 2
     rate, contacts = np.zeros((slots, 6)), np.zeros((slots - 2, 7))
-    hessian.add_stiffness_times(count, direction, stop, rate)
+    hessian.add_stiffness_times(count, direction, points, rate)
     rate[:, 3:] -= 0.5 * np.cross(path.state()[0][:, 3:], direction[:, 3:])
-    assert hessian.contact_rates(count, direction, np.ones(slots - 2), stop, contacts)[0] == hessian.SOUND
+    assert (
+        contact_rates.contact_rates(count, direction, np.ones(slots - 2), points, contacts)[0]
+        == hessian.NO_FAULT
+    )
     return rate, contacts
 
 
@@ -158,12 +161,12 @@ def test_hessian_is_symmetric(kinds: str) -> None:
     sound = 0
     for _ in range(CASES):
         path = lay_path(rng, kinds)
-        count, fault, stop = path.stops()
-        if fault != hessian.SOUND:
+        count, fault, points = path.points()
+        if fault != hessian.NO_FAULT:
             continue
         sound += 1
         slots = len(kinds) + 2
         work, matrix = np.empty((2, slots, 6)), np.empty((6 * slots, 6 * slots))
-        hessian.stiffness(count, stop, work[0], work[1], matrix)
+        hessian.stiffness(count, points, work[0], work[1], matrix)
         assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
     assert sound > CASES // 4

@@ -1,6 +1,6 @@
-"""Ends inside a surface: what stands in for the path that does not exist goes on from it, and has an exact gradient.
+"""Ends inside a surface: the substitute path is continuous with the path outside, and has an exact gradient.
 
-The foot of an end is the surface point nearest to it, so an end is put at a height over a random point, along the
+The foot point of an end is the surface point nearest to it, so an end is put at a height over a random point, along the
 normal there. Everything is measured against differences of lengths.
 """
 
@@ -16,7 +16,7 @@ from derivative_scenes import SURFACES, exponential, times
 from numpy.typing import NDArray
 
 import mjwrap as mw
-from mjwrap.kernels.spans.end_inside import NOWHERE
+from mjwrap.kernels.spans.end_inside import NO_SUBSTITUTE
 from mjwrap.plugin import excitations, read
 from mjwrap.verification.scenes import nearest, outward
 
@@ -140,7 +140,7 @@ def test_nothing_stands_in_where_wraps_are_searched_for(letter: str) -> None:
     for scene, _ in scenes(letter, 5):
         for sol in (scene.solve(-0.5 * DEEPEST), scene.solve(-0.5 * DEEPEST, back=True)):
             assert sol.status == mw.Status.ENDPOINT_INSIDE
-            assert sol.tangency_error == NOWHERE
+            assert sol.tangency_error == NO_SUBSTITUTE
 
 
 def test_an_end_deep_inside_goes_straight_through_to_where_it_leaves() -> None:

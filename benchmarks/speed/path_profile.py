@@ -23,7 +23,7 @@ import mjwrap as mw
 from mjwrap.kernels import layout
 from mjwrap.kernels.geometry import geodesics
 from mjwrap.kernels.spans import chain
-from mjwrap.kernels.tangency import certify, newton
+from mjwrap.kernels.tangency import block_elimination, certify, tangency_error
 from mjwrap.paths.scene import owners
 
 njit: Any = numba.njit
@@ -57,7 +57,7 @@ def _evaluations(count, first, waiting, ends, node):
     total = 0.0
     for _ in range(count):
         node[first, S_ARC] = arc + waiting * total
-        total += newton.evaluate(0, node.shape[0], ends, node)
+        total += tangency_error.evaluate(0, node.shape[0], ends, node)
     return total
 
 
@@ -66,7 +66,7 @@ def _steps(count, first, waiting, node):
     size = node[first, W_L]
     for _ in range(count):
         node[first, W_L] = size + waiting * node[first, W_Y]
-        newton.step(0, node.shape[0], node)
+        block_elimination.solve_newton_system(0, node.shape[0], node)
 
 
 @njit
@@ -80,7 +80,7 @@ def _moves(count, touched, waiting, node):
 def _minima(count, first, waiting, node):
     size = node[first, W_L]
     for _ in range(count):
-        node[first, W_L] = size + waiting * certify.minimal(0, node.shape[0], node)
+        node[first, W_L] = size + waiting * certify.is_local_minimum(0, node.shape[0], node)
 
 
 @njit

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError, PathError
 from mjwrap.kernels import layout
-from mjwrap.kernels.solved import hessian
+from mjwrap.kernels.solved import contact_rates, hessian
 from mjwrap.paths.contact import Contact
 from mjwrap.paths.scene import Array, Point, vector
 from mjwrap.paths.status import Status
@@ -89,18 +89,18 @@ class Derivatives:
         return f"{'via point' if via else 'obstacle'} {slot - 1}"
 
     def _raise(self, what: str, fault: int, slot: int) -> None:
-        if fault != hessian.SOUND:
+        if fault != hessian.NO_FAULT:
             raise GeometryError(f"the path has no {what} here: {FAULTS[fault].format(self._slot(slot))}")
 
-    def _stops(self, what: str, strict: bool = True) -> tuple[int, Array]:
-        """Return the number of stops and their rows; raise where the path was not found or, if strict, for a fault."""
+    def _path_points(self, what: str, strict: bool = True) -> tuple[int, Array]:
+        """Return the number of path points and their rows; raise where there is no path or, if strict, for a fault."""
         if self.status != Status.CONVERGED:
             raise PathError(f"the path has no {what}: {self.status.message}")
-        stop = np.empty((len(self._node) + 2, hessian.STOP))
-        count, fault, slot = hessian.list_stops(*self._ends, self._node, self._owner, stop)
+        points = np.empty((len(self._node) + 2, hessian.POINT_ROW))
+        count, fault, slot = hessian.list_path_points(*self._ends, self._node, self._owner, points)
         if strict:
             self._raise(what, fault, slot)
-        return count, stop
+        return count, points
 
     def gradient(self) -> Array:
         """Return ∂l/∂x (n + 2, 6): force [-], then moment about the pose's origin [m], of every slot, world frame.
@@ -108,9 +108,9 @@ class Derivatives:
         Its product with twists is l̇. Tension F pulls with -F times this; `wrenches` has moments about the world
         origin. Exists, with the geodesic's direction, where a segment vanishes on a surface.
         """
-        count, stop = self._stops("gradient", strict=False)
+        count, points = self._path_points("gradient", strict=False)
         out = np.zeros((len(self.contacts) + 2, 6))
-        hessian.add_gradient(count, stop, out)
+        hessian.add_gradient(count, points, out)
         return out
 
     def stiffness(self) -> Array:
@@ -122,10 +122,10 @@ class Derivatives:
         in `gradient()` and ω the angular velocity: turns do not commute, so that rate is not symmetric. `GeometryError`
         where a segment has no length (an end point on a surface) or a contact is about to slip.
         """
-        count, stop = self._stops("stiffness")
+        count, points = self._path_points("stiffness")
         slots = len(self.contacts) + 2
         twist, out, matrix = np.empty((slots, 6)), np.empty((slots, 6)), np.empty((6 * slots, 6 * slots))
-        hessian.stiffness(count, stop, twist, out, matrix)
+        hessian.stiffness(count, points, twist, out, matrix)
         return matrix
 
     def stiffness_times(self, direction: ArrayLike) -> Array:
@@ -133,13 +133,13 @@ class Derivatives:
 
         `GeometryError` as for `stiffness`, and for a direction of another shape or not finite.
         """
-        count, stop = self._stops("stiffness")
+        count, points = self._path_points("stiffness")
         given = np.array(direction, dtype=np.float64)
         shape = (len(self.contacts) + 2, 6)
         if given.shape != shape or not np.isfinite(given).all():
             raise GeometryError(f"direction must be finite and have shape {shape}, not {given.shape}")
         out = np.zeros(shape)
-        hessian.add_stiffness_times(count, given, stop, out)
+        hessian.add_stiffness_times(count, given, points, out)
         return out
 
     def contact_velocities(
@@ -150,11 +150,11 @@ class Derivatives:
         At touchdown (arc length zero) it is that of the path that touches. `GeometryError` as for `stiffness`, and
         where the surface is flat along the path, so that a contact may lie anywhere.
         """
-        count, stop = self._stops("contact velocities")
+        count, points = self._path_points("contact velocities")
         twist = self._twists(origin_velocity, insertion_velocity, twists)
         rates = np.zeros((len(self._node), 7))
         size = np.ascontiguousarray(self._node[:, layout.SIZE])
-        self._raise("contact velocities", *hessian.contact_rates(count, twist, size, stop, rates))
+        self._raise("contact velocities", *contact_rates.contact_rates(count, twist, size, points, rates))
         found: list[ContactVelocity] = []
         for row, k in enumerate(self._owner):
             one = self._contact_velocity(row, twist[k + 1], rates[row])

@@ -54,12 +54,12 @@ class PathSolution(Derivatives):
         self.tangency_error = float(info[layout.I_ERROR])
         self.iterations = int(info[layout.I_ITERATIONS])
         self.evaluations = int(info[layout.I_EVALUATIONS])
-        known = end_inside.has_length(self.status, self.tangency_error)
+        known = end_inside.has_valid_length(self.status, self.tangency_error)
         self._saved = self._node[:, SAVED].copy() if known else saved_before.copy()
         if self.status == Status.ENDPOINT_INSIDE and not known:
             self._saved[:, 0] = layout.COLD  # where a string comes out again is anybody's guess
         stands_in = known and not self.converged
-        list_them = end_inside.list_standing if stands_in else segments.list_segments
+        list_them = end_inside.list_pulling_segments if stands_in else segments.list_segments
         self._count = list_them(*self._ends, self._node, self._segments, 0)
         self.contacts = []
         for row, k in enumerate(self._owner):
@@ -139,7 +139,7 @@ class PathSolution(Derivatives):
         """Return what the path under `tension` [N] does to origin, each obstacle and insertion.
 
         (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
-        is -tension l̇ (docs/derivation.md, velocity and force).
+        is -tension l̇ ("Velocity and force" in docs/derivation.md).
         """
         if not np.isfinite(tension):
             raise GeometryError(f"tension must be finite [N], not {tension!r}")

@@ -32,7 +32,7 @@ def length_jacobian_rate(muscles: Results, state: State, direction: ArrayLike | 
         mujoco.mj_comVel(model, scratch)
     longest = max((int(r[muscle_paths.R_HI] - r[muscle_paths.R_LO]) for r in plan.routes), default=0) + 2
     work = (np.empty((longest, 6)), np.empty((longest, 6)), np.empty((longest, 6)))
-    stop = np.empty((longest, hessian.STOP))
+    points = np.empty((longest, hessian.POINT_ROW))
     jacobian = np.zeros((plan.n, model.nv))
     kinematics = (
         *muscles._dofs, muscles._parent, *_joints(model), muscles._root,
@@ -40,9 +40,9 @@ def length_jacobian_rate(muscles: Results, state: State, direction: ArrayLike | 
     )  # fmt: skip
     fault, route, slot = jacobian_rate.length_jacobian_rate(
         plan.routes, plan.weights, plan.links, scratch.site_xpos, state.node, kinematics,
-        *work, np.arange(longest), stop, jacobian,
+        *work, np.arange(longest), points, jacobian,
     )  # fmt: skip
-    if fault != hessian.SOUND:
+    if fault != hessian.NO_FAULT:
         row = plan.routes[route]
         name = muscles.names[int(row[muscle_paths.R_MUSCLE])]
         where = _slot(model, plan.links, row, slot)

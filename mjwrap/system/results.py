@@ -93,7 +93,7 @@ class Results:
         """
         status, error = self._evaluation().status, self.tangency_error
         return (status != Status.CONVERGED) & (
-            (status != Status.ENDPOINT_INSIDE) | (error >= end_inside.NOWHERE)
+            (status != Status.ENDPOINT_INSIDE) | (error >= end_inside.NO_SUBSTITUTE)
         )
 
     @property

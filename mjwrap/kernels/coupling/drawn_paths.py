@@ -9,7 +9,7 @@ from mjwrap.kernels._jit import inlined, jit
 from mjwrap.kernels.coupling.muscle_paths import R_HI, R_LO, R_MUSCLE
 from mjwrap.kernels.solved.polyline import polyline
 from mjwrap.kernels.solved.segments import G_A, G_B, G_FAR
-from mjwrap.kernels.spans.end_inside import has_length
+from mjwrap.kernels.spans.end_inside import has_valid_length
 
 
 @inlined
@@ -27,7 +27,7 @@ def route_points(c, routes, node, seg, seg_count, info, spacing, out, count):
         return count
     lo, hi = routes[c, R_LO], routes[c, R_HI]
     first, last = lo + c, lo + c + seg_count[c] - 1
-    if has_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
+    if has_valid_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
         return count + polyline(
             lo, hi, seg[first, G_A], seg[first, G_A + 1], seg[first, G_A + 2],
             seg[last, G_B], seg[last, G_B + 1], seg[last, G_B + 2], node, spacing, out, count,

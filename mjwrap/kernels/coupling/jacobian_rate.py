@@ -19,7 +19,7 @@ from mjwrap.kernels.coupling.muscle_paths import (
     R_TO,
     R_TO_BODY,
 )
-from mjwrap.kernels.solved.hessian import SOUND, add_gradient, add_stiffness_times, list_stops
+from mjwrap.kernels.solved.hessian import NO_FAULT, add_gradient, add_stiffness_times, list_path_points
 
 
 @jit
@@ -104,8 +104,8 @@ def length_jacobian_rate(
     """Write d(dl/dq)/dt (n, nv) of every muscle along the motion that cvel and cdof_dot belong to.
 
     kinematics: what mjModel and mjData know, see `_add_row`. twist, gradient, rate (longest chain + 2, 6) and stop
-    (longest chain + 2, STOP) are scratch; owner: 0, 1, 2 ..., a slot for each node. Returns (SOUND, 0, 0), or fault,
-    route and slot where there is no derivative.
+    (longest chain + 2, POINT_ROW) are scratch; owner: 0, 1, 2 ..., a slot for each node. Returns (NO_FAULT, 0, 0), or
+    fault, route and slot where there is no derivative.
     """
     body_rootid, cvel, subtree_com = kinematics[6], kinematics[7], kinematics[10]
     for m in range(jacobian.shape[0]):
@@ -130,8 +130,8 @@ def length_jacobian_rate(
                 rate[k, i] = 0.0
         _, ox, oy, oz = _slot(c, 0, routes, links, site_xpos, node)
         _, ix, iy, iz = _slot(c, slots - 1, routes, links, site_xpos, node)
-        count, fault, where = list_stops(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, stop)
-        if fault != SOUND:
+        count, fault, where = list_path_points(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, stop)
+        if fault != NO_FAULT:
             return fault, c, where
         add_gradient(count, stop, gradient)
         add_stiffness_times(count, twist, stop, rate)
@@ -147,4 +147,4 @@ def length_jacobian_rate(
             _add_row(
                 weights[c], k, place, body, gradient, rate, twist, kinematics, routes[c, R_MUSCLE], jacobian
             )
-    return SOUND, 0, 0
+    return NO_FAULT, 0, 0

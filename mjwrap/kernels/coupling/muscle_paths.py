@@ -12,7 +12,7 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, VANISHING, list_segments
 from mjwrap.kernels.spans.chain import solve_chain
-from mjwrap.kernels.spans.end_inside import has_length, list_standing
+from mjwrap.kernels.spans.end_inside import has_valid_length, list_pulling_segments
 
 # columns of `links` (N, 4): ids of a node's site, geom, hint site (-1 where none) and body
 L_SITE, L_GEOM, L_HINT, L_BODY = 0, 1, 2, 3
@@ -190,8 +190,8 @@ def solve_routes(routes, poses, paths, tol):
         status = info[c, lay.I_STATUS]
         if status == lay.CONVERGED:
             paths.count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
-        elif has_length(status, info[c, lay.I_ERROR]):
-            paths.count[c] = list_standing(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
+        elif has_valid_length(status, info[c, lay.I_ERROR]):
+            paths.count[c] = list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
         else:  # where a string comes out again is anybody's guess
             _roll_back(lo, hi, cold or status == lay.ENDPOINT_INSIDE, node)
             continue
@@ -213,7 +213,7 @@ def measure_muscles(routes, info, states):
         total, speed = 0.0, 0.0
         while c < routes.rows.shape[0] and routes.rows[c, R_MUSCLE] == m:
             here = int(info[c, lay.I_STATUS])
-            if not has_length(here, info[c, lay.I_ERROR]):
+            if not has_valid_length(here, info[c, lay.I_ERROR]):
                 code, known = here if known else code, False
             elif code == lay.CONVERGED:
                 code = here

@@ -1,7 +1,8 @@
 """Geodesics in closed form, with their Jacobi fields: cylinder, cone, sphere, capsule.
 
 Darboux frame (t, n, b = t x n); kappa = t.Wt, tau = t.Wb, beta = b.Wb with the shape operator W, dn = W dp.
-a, r are the Jacobi fields of method section 2: a'' = -K a, a(0) = 1, a'(0) = 0; r(0) = 0, r'(0) = 1.
+a, r are the Jacobi fields: a'' = -K a, a(0) = 1, a'(0) = 0; r(0) = 0, r'(0) = 1 ("How a geodesic moves" in
+docs/derivation.md).
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def geodesic(k, node, base_x, base_y, base_z):
 
 @jit
 def displace(k, d0, d1, d2, d3, node):
-    """Move obstacle k's saved geodesic by the natural variations (d0, d1, d2, d3) of method section 2.
+    """Move obstacle k's saved geodesic by its natural geodesic variations (d0, d1, d2, d3).
 
     d0 slides it along t, d1 shifts its start along b, d2 turns t towards b, d3 lengthens it [m, m, rad, m].
     """

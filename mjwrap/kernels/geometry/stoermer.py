@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -37,7 +38,7 @@ WEIGHT = _weights(_N)
 RATE = WEIGHT * _N  # for the differences, which are 1/n of h times the rate
 DOUBT = WEIGHT - np.append(_weights(_N[:-1]), 0.0)  # weights of the error estimate
 
-TOLERANCE = 1e-11  # of the estimate: the error of a step is then below 1e-12, mostly 1e-14 (`benchmarks/geodesics.py`)
+TOLERANCE = 1e-11  # of the estimate: the error of a step is then below 1e-12, mostly 1e-14 (docs/accuracy.md)
 SHRINK = 1.0 / 15.0  # power by which a rejected step shrinks
 MAX_STEPS = 200  # of one geodesic, rejected ones included
 

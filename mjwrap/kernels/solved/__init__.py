@@ -1,1 +1,1 @@
-"""What follows from a solved path: straight segments, velocities, forces, derivatives, points to draw."""
+"""Results of a solved path: straight segments, velocities, forces, derivatives, points to draw."""

@@ -1,4 +1,4 @@
-"""How the corner of a string that is held inside slides when bodies move (`inside.py`, `derivatives.py`).
+"""Sliding of the corner of a string that is held inside, as bodies move (`wraps/held_inside.py`, `hessian.py`).
 
 With e, e' the segments that meet at P, e - e' = -2 c n. Where P is displaced by x = x1 t1 + x2 t2 on a surface with
 curvatures k1, k2 the length's second variation is that of
@@ -6,7 +6,7 @@ curvatures k1, k2 the length's second variation is that of
     |u + x|^2 / 2 L + |u' - x|^2 / 2 L' + c (k1 x1^2 + k2 x2^2) - 2 c w.(x x n)
 
 (only components across e and e' count), u, u' the differences of the material velocities over the two segments and w
-the surface's angular velocity. The corner stands between fixed stops, so that x is all that is free: 2 x 2.
+the surface's angular velocity. The corner stands between fixed points, so that x is all that is free: 2 x 2.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ SHORTEST = 1e-150  # [m]
 
 
 @jit
-def list_corner(k, node, i, stop):
-    """Write normal, directions of sliding and curvatures at the corner of node k, whose P stands in stop i."""
-    nx, ny, nz = normal(k, stop[i, D_P], stop[i, D_P + 1], stop[i, D_P + 2], node)
+def list_corner(k, node, i, points):
+    """Write normal, directions of sliding and curvatures at the corner of node k, whose P stands in point i."""
+    nx, ny, nz = normal(k, points[i, D_P], points[i, D_P + 1], points[i, D_P + 2], node)
+    # t1 round the axis: axis x n; on a sphere, whose curvatures are equal, any axis that is not along n
     cylinder = node[k, lay.INSIDE] == lay.ABOUT_AXIS
     x, y, z = node[k, lay.ROT + 2], node[k, lay.ROT + 5], node[k, lay.ROT + 8]
     if not cylinder:
@@ -54,63 +55,70 @@ def list_corner(k, node, i, stop):
     tx, ty, tz = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
     over = 1.0 / (tx * tx + ty * ty + tz * tz) ** 0.5
     tx, ty, tz = tx * over, ty * over, tz * over
-    stop[i, D_NP], stop[i, D_NP + 1], stop[i, D_NP + 2] = nx, ny, nz
-    stop[i, D_T1], stop[i, D_T1 + 1], stop[i, D_T1 + 2] = tx, ty, tz
-    stop[i, D_T2] = ny * tz - nz * ty
-    stop[i, D_T2 + 1] = nz * tx - nx * tz
-    stop[i, D_T2 + 2] = nx * ty - ny * tx
-    stop[i, D_BEND] = 1.0 / node[k, lay.DIM]
-    stop[i, D_BEND + 1] = 0.0 if cylinder else stop[i, D_BEND]
+    points[i, D_NP], points[i, D_NP + 1], points[i, D_NP + 2] = nx, ny, nz
+    points[i, D_T1], points[i, D_T1 + 1], points[i, D_T1 + 2] = tx, ty, tz
+    points[i, D_T2] = ny * tz - nz * ty
+    points[i, D_T2 + 1] = nz * tx - nx * tz
+    points[i, D_T2 + 2] = nx * ty - ny * tx
+    points[i, D_BEND] = 1.0 / node[k, lay.DIM]
+    points[i, D_BEND + 1] = 0.0 if cylinder else points[i, D_BEND]
 
 
 @jit
-def stiffen_corner(i, stop):
-    """Write the stiffness against sliding of the corner at stop i; return its determinant over that of its segments."""
-    over, next_over = 1.0 / max(stop[i, D_L], SHORTEST), 1.0 / max(stop[i + 1, D_L], SHORTEST)
-    c = 0.5 * (dot(stop, i, D_NP, i + 1, D_E) - dot(stop, i, D_NP, i, D_E))
-    e1, e2 = dot(stop, i, D_T1, i, D_E), dot(stop, i, D_T2, i, D_E)
-    g1, g2 = dot(stop, i, D_T1, i + 1, D_E), dot(stop, i, D_T2, i + 1, D_E)
-    stop[i, D_DEPTH] = c
-    stop[i, D_H11] = (1.0 - e1 * e1) * over + (1.0 - g1 * g1) * next_over + 2.0 * c * stop[i, D_BEND]
-    stop[i, D_H12] = -e1 * e2 * over - g1 * g2 * next_over
-    stop[i, D_H22] = (1.0 - e2 * e2) * over + (1.0 - g2 * g2) * next_over + 2.0 * c * stop[i, D_BEND + 1]
-    return (stop[i, D_H11] * stop[i, D_H22] - stop[i, D_H12] * stop[i, D_H12]) / (over + next_over) ** 2
+def stiffen_corner(i, points):
+    """Write the stiffness against sliding of the corner at point i; return its determinant over the segments'."""
+    # half the second variation, in x1 and x2: (1 - (e·t1)²)/L + (1 - (e'·t1)²)/L' + 2 c k1, and so on
+    over, next_over = 1.0 / max(points[i, D_L], SHORTEST), 1.0 / max(points[i + 1, D_L], SHORTEST)
+    c = 0.5 * (dot(points, i, D_NP, i + 1, D_E) - dot(points, i, D_NP, i, D_E))
+    e1, e2 = dot(points, i, D_T1, i, D_E), dot(points, i, D_T2, i, D_E)
+    g1, g2 = dot(points, i, D_T1, i + 1, D_E), dot(points, i, D_T2, i + 1, D_E)
+    points[i, D_DEPTH] = c
+    points[i, D_H11] = (1.0 - e1 * e1) * over + (1.0 - g1 * g1) * next_over + 2.0 * c * points[i, D_BEND]
+    points[i, D_H12] = -e1 * e2 * over - g1 * g2 * next_over
+    points[i, D_H22] = (1.0 - e2 * e2) * over + (1.0 - g2 * g2) * next_over + 2.0 * c * points[i, D_BEND + 1]
+    return (points[i, D_H11] * points[i, D_H22] - points[i, D_H12] * points[i, D_H12]) / (
+        over + next_over
+    ) ** 2
 
 
 @jit
-def _slope(i, direction, twist, stop):
-    """Return what drives the corner at stop i along one of its directions."""
-    near = dot(stop, i, D_U, i, direction) - dot(stop, i, D_U, i, D_E) * dot(stop, i, direction, i, D_E)
+def _driving_slope(i, direction, twist, points):
+    """Return what drives the corner at point i along one of its directions."""
+    near = dot(points, i, D_U, i, direction) - dot(points, i, D_U, i, D_E) * dot(points, i, direction, i, D_E)
     j = i + 1
-    far = dot(stop, j, D_U, i, direction) - dot(stop, j, D_U, j, D_E) * dot(stop, i, direction, j, D_E)
-    d, n, k = direction, D_NP, int(stop[i, D_SLOT])
+    far = dot(points, j, D_U, i, direction) - dot(points, j, D_U, j, D_E) * dot(points, i, direction, j, D_E)
+    # w·(t x n): the surface's turning
+    d, n, k = direction, D_NP, int(points[i, D_SLOT])
     turn = (
-        twist[k, 3] * (stop[i, d + 1] * stop[i, n + 2] - stop[i, d + 2] * stop[i, n + 1])
-        + twist[k, 4] * (stop[i, d + 2] * stop[i, n] - stop[i, d] * stop[i, n + 2])
-        + twist[k, 5] * (stop[i, d] * stop[i, n + 1] - stop[i, d + 1] * stop[i, n])
+        twist[k, 3] * (points[i, d + 1] * points[i, n + 2] - points[i, d + 2] * points[i, n + 1])
+        + twist[k, 4] * (points[i, d + 2] * points[i, n] - points[i, d] * points[i, n + 2])
+        + twist[k, 5] * (points[i, d] * points[i, n + 1] - points[i, d + 1] * points[i, n])
     )
-    return far / stop[j, D_L] - near / stop[i, D_L] + 2.0 * stop[i, D_DEPTH] * turn
+    return far / points[j, D_L] - near / points[i, D_L] + 2.0 * points[i, D_DEPTH] * turn
 
 
 @jit
-def slide_corner(i, twist, stop):
-    """Write how the corner at stop i slides as the poses move; D_U of both segments is known."""
-    a, b = _slope(i, D_T1, twist, stop), _slope(i, D_T2, twist, stop)
-    over = 1.0 / (stop[i, D_H11] * stop[i, D_H22] - stop[i, D_H12] * stop[i, D_H12])
-    x, y = (a * stop[i, D_H22] - b * stop[i, D_H12]) * over, (b * stop[i, D_H11] - a * stop[i, D_H12]) * over
+def slide_corner(i, twist, points):
+    """Write how the corner at point i slides as the poses move; D_U of both segments is known."""
+    a, b = _driving_slope(i, D_T1, twist, points), _driving_slope(i, D_T2, twist, points)
+    over = 1.0 / (points[i, D_H11] * points[i, D_H22] - points[i, D_H12] * points[i, D_H12])
+    x, y = (
+        (a * points[i, D_H22] - b * points[i, D_H12]) * over,
+        (b * points[i, D_H11] - a * points[i, D_H12]) * over,
+    )
     for c in range(3):
-        stop[i, D_SLIDE + c] = x * stop[i, D_T1 + c] + y * stop[i, D_T2 + c]
+        points[i, D_SLIDE + c] = x * points[i, D_T1 + c] + y * points[i, D_T2 + c]
 
 
 @jit
-def turn_corner(i, stop, out):
-    """Add to out[slot of stop i] the moment that its corner's slide makes: slide x (e - e')."""
-    k, j = int(stop[i, D_SLOT]), i + 1
-    x, y, z = stop[i, D_SLIDE], stop[i, D_SLIDE + 1], stop[i, D_SLIDE + 2]
+def turn_corner(i, points, out):
+    """Add to out[slot of point i] the moment that its corner's slide makes: slide x (e - e')."""
+    k, j = int(points[i, D_SLOT]), i + 1
+    x, y, z = points[i, D_SLIDE], points[i, D_SLIDE + 1], points[i, D_SLIDE + 2]
     ex, ey, ez = (
-        stop[i, D_E] - stop[j, D_E],
-        stop[i, D_E + 1] - stop[j, D_E + 1],
-        stop[i, D_E + 2] - stop[j, D_E + 2],
+        points[i, D_E] - points[j, D_E],
+        points[i, D_E + 1] - points[j, D_E + 1],
+        points[i, D_E + 2] - points[j, D_E + 2],
     )
     out[k, 3] += y * ez - z * ey
     out[k, 4] += z * ex - x * ez

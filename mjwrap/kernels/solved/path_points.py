@@ -1,6 +1,6 @@
-"""The rows of `stop` (rows of nodes + 2, STOP): the points that a path runs through, from origin to insertion.
+"""The rows of `points` (rows of nodes + 2, POINT_ROW): the points that a path runs through, from origin to insertion.
 
-Nodes that are not touched have none. `derivatives.py` says what a row is for.
+Nodes that are not touched have none. `hessian.py` says what a row is for.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ D_BQ = 21
 D_R = 24  # Jacobi field r at Q [m]
 D_KP = 25  # kappa, tau at P
 D_KQ = 27  # kappa, tau at Q
-D_COS = 29  # b_P . b_Q of the stop before
+D_COS = 29  # b_P . b_Q of the point before
 D_FIELD = 30  # a + c r: the Jacobi field that the path before P allows
 D_PIVOT = 31  # 1 + c L of the segment that leaves
 D_C = 32  # stiffness c behind Q [1/m]
@@ -31,13 +31,12 @@ D_X = 38  # shift of P along b_P, of Q along b_Q
 D_Y = 39
 D_RATE = 40  # rate of e (3)
 D_ROW = 43  # of the node, from the chain's first one
-STOP = 44
+POINT_ROW = 44
 
 FIXED = 0.0  # origin, insertion, via point
 TANGENT = 1.0  # a contact that the path meets and leaves along the surface
-CORNER = (
-    2.0  # a string held inside (`inside.py`), between two fixed stops; it uses these columns differently:
-)
+CORNER = 2.0  # a string held inside (`held_inside.py`), between two fixed points
+# A corner uses some of the columns differently.
 D_T1 = D_BP  # the directions in which it can slide (3 each): round and along a cylinder's axis
 D_T2 = D_BQ
 D_BEND = D_KP  # curvature along them
@@ -45,19 +44,21 @@ D_SLIDE = D_KQ  # how it slides (3); over D_KQ, D_COS
 
 
 @jit
-def dot(stop, i, left, j, right):
-    """Return the dot product of two column triples of two stops."""
+def dot(points, i, left, j, right):
+    """Return the dot product of two column triples of two points."""
     return (
-        stop[i, left] * stop[j, right]
-        + stop[i, left + 1] * stop[j, right + 1]
-        + stop[i, left + 2] * stop[j, right + 2]
+        points[i, left] * points[j, right]
+        + points[i, left + 1] * points[j, right + 1]
+        + points[i, left + 2] * points[j, right + 2]
     )
 
 
 @jit
-def spin(i, column, twist, stop):
-    """Return the angular velocity of stop i's body along the vector in `column`."""
-    k = int(stop[i, D_SLOT])
+def angular_velocity_along(i, column, twist, points):
+    """Return the angular velocity of point i's body along the vector in `column`."""
+    k = int(points[i, D_SLOT])
     return (
-        twist[k, 3] * stop[i, column] + twist[k, 4] * stop[i, column + 1] + twist[k, 5] * stop[i, column + 2]
+        twist[k, 3] * points[i, column]
+        + twist[k, 4] * points[i, column + 1]
+        + twist[k, 5] * points[i, column + 2]
     )

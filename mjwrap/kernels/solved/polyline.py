@@ -9,7 +9,7 @@ from mjwrap.kernels._jit import jit
 from mjwrap.kernels.geometry.geodesics import geodesic
 
 W_P, W_Q, W_TP, S_ARC, S_MODE = lay.W_P, lay.W_Q, lay.W_TP, lay.S_ARC, lay.S_MODE
-TURN = 0.1  # without a spacing, geodesics are drawn with this turn between points [rad]
+DRAWN_TURN = 0.1  # without a spacing, geodesics are drawn with this turn between points [rad]
 
 
 @jit
@@ -50,8 +50,9 @@ def polyline(lo, hi, ox, oy, oz, ix, iy, iz, node, spacing, out, first):
             x, y, z = px, py, pz
         elif node[k, S_MODE] == lay.TOUCHED:
             arc = node[k, S_ARC]
+            # how far the normal turns along the arc: |dn/ds| = sqrt(κ² + τ²)
             turn = arc * math.sqrt(node[k, lay.W_KP] ** 2 + node[k, lay.W_KP + 1] ** 2)
-            pieces = max(int(math.ceil(arc / spacing if spacing > 0.0 else turn / TURN)), 1)
+            pieces = max(int(math.ceil(arc / spacing if spacing > 0.0 else turn / DRAWN_TURN)), 1)
             px, py, pz = node[k, W_P] + ox, node[k, W_P + 1] + oy, node[k, W_P + 2] + oz
             count = _straight(x, y, z, px, py, pz, spacing, out, count)
             for i in range(1, pieces + 1):  # the last one leaves the row as it was

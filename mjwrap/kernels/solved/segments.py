@@ -1,4 +1,4 @@
-"""Velocity and forces of a solved path, from its straight segments alone (method section 5).
+"""Velocity and forces of a solved path, from its straight segments alone ("Velocity and force" in docs/derivation.md).
 
 Each end of a straight segment is a material point of some body at this instant. The list `seg` names them: one row per
 segment with near and far node (the chain's origin is lo - 1, its insertion hi), near point, far point and the unit
@@ -11,7 +11,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.tangency.newton import ON_SURFACE
+from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
 G_NEAR = 0
 G_FAR = 1
@@ -41,6 +41,7 @@ def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
             px, py, pz = ix - ox, iy - oy, iz - oz
         ex, ey, ez = px - x, py - y, pz - z
         size = math.sqrt(ex * ex + ey * ey + ez * ez)
+        # without a length, on a surface: the direction of the geodesic
         if k < hi and node[k, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[k, lay.SIZE]:
             ex, ey, ez = node[k, lay.W_TP], node[k, lay.W_TP + 1], node[k, lay.W_TP + 2]
         elif near >= lo and node[near, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[near, lay.SIZE]:
@@ -85,6 +86,7 @@ def lengthening_rate(count, seg, pos, twist):
     pos (n + 2, 3): positions of origin, obstacles and insertion; twist (n + 2, 6): linear velocity of that position,
     then angular velocity, world frame [m/s, rad/s].
     """
+    # (17): Σ e · (v of the far end - v of the near end); how the contact points slide drops out
     rate = 0.0
     for j in range(count):
         ex, ey, ez = seg[j, G_E], seg[j, G_E + 1], seg[j, G_E + 2]

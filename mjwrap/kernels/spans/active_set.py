@@ -1,4 +1,9 @@
-"""Which obstacles are touched: lift-off, touchdown, the branch that is kept, and where a contact may lie."""
+"""The active set of a span, the obstacles that its path touches: lift-off, touchdown, contacts split and merged.
+
+"Touching or not" in docs/derivation.md. A straight segment is tested against a surface in `_penetrates`, by
+`geometry.table.dip`. A surface with hollows has two rows, as a string may touch it on both sides of a hollow that
+it bridges ("Hollows"): the second one has a number in TOUCH.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +22,12 @@ S_MODE, S_SWEEP, S_P, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_ARC
 W_P, W_Q = lay.W_P, lay.W_Q
 FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
-MET = 1e-5  # contacts on both sides of a hollow that are so near, in the surface's size, have met
-MEETING = 1e-3  # the same where Newton's method fails: a segment that vanishes has no direction
-PIECES = 24  # of a geodesic, to find where it runs through a hollow
-DEPTH = (
+MERGE_DISTANCE = 1e-5  # contacts on both sides of a hollow that are so near, in the surface's size, have met
+MERGE_DISTANCE_ON_FAILURE = (
+    1e-3  # the same where Newton's method fails: a segment that vanishes has no direction
+)
+HOLLOW_SAMPLES = 24  # of a geodesic, to find where it runs through a hollow
+LEAST_DEPTH = (
     -1e-9
 )  # a segment that dips less below the surface that it leaves or meets, in its size, only touches it
 
@@ -33,7 +40,7 @@ def _has_twin(k, hi, node):
 
 @jit
 def follow_branch(lo, hi, node):
-    """Note how far the path sweeps about every surface; return False where that is not the way it went before.
+    """Write how far the path sweeps about every surface; return False where that is not the way it went before.
 
     Of the two contacts of a bridged hollow only their sum is topological, and Newton's method keeps them.
     """
@@ -45,6 +52,7 @@ def follow_branch(lo, hi, node):
             angle = swept(k, node)
             if _has_twin(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
                 node[k, S_SWEEP] = angle
+            # another branch differs by whole turns, the same one by rounding: any bound in between will do
             elif abs(angle - follow(angle, node[k, S_SWEEP])) > 1.0:
                 same = False
             else:
@@ -53,32 +61,36 @@ def follow_branch(lo, hi, node):
 
 
 @jit
-def release(k, node):
-    """Let go of a contact; where the straight segment beside the surface runs is not known yet."""
+def remove_contact(k, node):
+    """Remove the contact of row k, which is FREE then."""
     node[k, S_MODE] = FREE
+    # zeros: where the straight segment beside the surface runs is not known yet
     for i in range(7):
         node[k, S_P + i] = 0.0
 
 
 @jit
-def drop(lo, hi, node):
-    """Release the obstacles whose arc is negative; return how many."""
-    dropped = 0
+def lift_off(lo, hi, node):
+    """Remove the contacts whose arc is negative; return how many.
+
+    As the arc goes through zero the contact is a point with e = e' = t, so that length and forces are continuous.
+    """
+    removed = 0
     for k in range(lo, hi):
         if node[k, S_MODE] == TOUCHED and node[k, S_ARC] < 0.0:
-            release(k, node)
-            dropped += 1
-    return dropped
+            remove_contact(k, node)
+            removed += 1
+    return removed
 
 
 @jit
-def _dips(k, node, ends, ax, ay, az, bx, by, bz):
-    """Return whether the segment from A to B, relative to the base, enters obstacle k."""
+def _penetrates(k, node, ends, ax, ay, az, bx, by, bz):
+    """Return whether the straight segment from A to B, relative to the base, enters obstacle k."""
     x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
     ax, ay, az = turn_into_frame(node, k, ax - x, ay - y, az - z)
     bx, by, bz = turn_into_frame(node, k, bx - x, by - y, bz - z)
     low, _ = dip(node, k, ax, ay, az, bx, by, bz)
-    return low < DEPTH * node[k, SIZE]
+    return low < LEAST_DEPTH * node[k, SIZE]
 
 
 @jit
@@ -91,19 +103,18 @@ def _next_contact(k, hi, ends, node):
 
 
 @jit
-def _hand_over(k, node):
-    """Move the contact of row k to its twin, the surface's second row."""
+def _move_to_second_row(k, node):
+    """Move the contact of row k to the surface's second row."""
     for i in range(lay.STATE):
         node[k + 1, S_MODE + i] = node[k, S_MODE + i]
-    release(k, node)
+    remove_contact(k, node)
 
 
 @jit
-def split(lo, hi, ends, node):
-    """Where a geodesic runs through a hollow that the string would bridge, give its far part to the surface's second
-    row.
+def split_at_hollow(lo, hi, ends, node):
+    """Split the geodesics that run through a hollow, which a string bridges; return how many.
 
-    Returns how many contacts were split.
+    The part before the hollow keeps the row, the part behind it goes to the surface's second row.
     """
     count = 0
     for k in range(lo, hi - 1):
@@ -112,18 +123,21 @@ def split(lo, hi, ends, node):
         if not _has_twin(k, hi, node) or node[k + 1, S_MODE] == TOUCHED:
             continue
         arc = node[k, S_ARC]
+        # first and last of the pieces at whose end the surface is concave along the geodesic
         first, last = -1, -1
-        for i in range(PIECES + 1):
-            node[k, S_ARC] = arc * i / PIECES
+        for i in range(HOLLOW_SAMPLES + 1):
+            node[k, S_ARC] = arc * i / HOLLOW_SAMPLES
             geodesic(k, node, ends[0], ends[1], ends[2])
             if node[k, lay.W_KQ] < 0.0:
                 first = i if first < 0 else first
                 last = i
-        if first <= 0 or last >= PIECES:  # it starts or ends in the hollow: no string does
+        # a geodesic that starts or ends in the hollow is nowhere near a string
+        if first <= 0 or last >= HOLLOW_SAMPLES:
             node[k, S_ARC] = arc
             geodesic(k, node, ends[0], ends[1], ends[2])
             continue
-        node[k, S_ARC] = arc * (last + 1) / PIECES
+        # the first sample behind the hollow is where the second contact starts, in S
+        node[k, S_ARC] = arc * (last + 1) / HOLLOW_SAMPLES
         geodesic(k, node, ends[0], ends[1], ends[2])
         x, y, z = (
             node[k, W_Q] - node[k, W_P],
@@ -139,8 +153,9 @@ def split(lo, hi, ends, node):
         node[k + 1, lay.S_T] = tx
         node[k + 1, lay.S_T + 1] = ty
         node[k + 1, lay.S_T + 2] = tz
-        node[k + 1, S_ARC] = arc * (PIECES - last - 1) / PIECES
-        node[k, S_ARC] = arc * (first - 1) / PIECES
+        # the first contact ends one sample before the hollow; Newton's method finds where both really end
+        node[k + 1, S_ARC] = arc * (HOLLOW_SAMPLES - last - 1) / HOLLOW_SAMPLES
+        node[k, S_ARC] = arc * (first - 1) / HOLLOW_SAMPLES
         geodesic(k, node, ends[0], ends[1], ends[2])
         geodesic(k + 1, node, ends[0], ends[1], ends[2])
         count += 1
@@ -148,22 +163,23 @@ def split(lo, hi, ends, node):
 
 
 @jit
-def join(lo, hi, ends, node, met):
-    """Make one contact of two that have met, where the surface in between bears the string; return how many.
+def merge_contacts(lo, hi, ends, node, distance):
+    """Merge the two contacts of a surface where they have met and it is not concave in between; return how many.
 
-    met: largest distance between them, in the surface's size.
+    distance: the largest between them that counts as met, in the surface's size.
     """
     count = 0
     for k in range(lo, hi - 1):
         if node[k, S_MODE] != TOUCHED or not _has_twin(k, hi, node) or node[k + 1, S_MODE] != TOUCHED:
             continue
-        if node[k, lay.W_LQ] > met * node[k, SIZE]:
+        if node[k, lay.W_LQ] > distance * node[k, SIZE]:
             continue
+        # try the geodesic through both of them, and go back where it runs through a hollow
         arc = node[k, S_ARC]
         node[k, S_ARC] = arc + node[k, lay.W_LQ] + node[k + 1, S_ARC]
         geodesic(k, node, ends[0], ends[1], ends[2])
         if node[k, lay.W_KMIN] >= 0.0:
-            release(k + 1, node)
+            remove_contact(k + 1, node)
             count += 1
         else:
             node[k, S_ARC] = arc
@@ -172,33 +188,42 @@ def join(lo, hi, ends, node, met):
 
 
 @jit
-def take_in(lo, hi, ends, node):
-    """Take in the obstacles that a straight segment enters; return how many, and the status that forbids a path."""
+def touchdown(lo, hi, ends, node):
+    """Wrap the obstacles that a straight segment enters; return how many, and the status that forbids a path.
+
+    The status is CONVERGED where none does. Obstacles are wrapped between the contact points before and after them.
+    """
+    # (x, y, z): where the straight segment that arrives at row k begins
     x, y, z = ends[3], ends[4], ends[5]
     added = 0
     status = lay.CONVERGED
     before = -1
     for k in range(lo, hi):
+        # a surface with hollows may be entered by the very segments that touch it
         if node[k, S_MODE] == TOUCHED and hollow(k, node):
-            if _dips(k, node, ends, x, y, z, node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]):
+            if _penetrates(k, node, ends, x, y, z, node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]):
                 if _has_twin(k, hi, node) and node[k + 1, S_MODE] != TOUCHED:
-                    _hand_over(k, node)
+                    _move_to_second_row(k, node)
                     geodesic(k + 1, node, ends[0], ends[1], ends[2])
                     added += 1
                 elif status == lay.CONVERGED:
                     status = lay.PENETRATING
             elif not _has_twin(k, hi, node):
                 _, qx, qy, qz = _next_contact(k, hi, ends, node)
-                last = _dips(k, node, ends, node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2], qx, qy, qz)
+                last = _penetrates(
+                    k, node, ends, node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2], qx, qy, qz
+                )
                 if last and status == lay.CONVERGED:
                     status = lay.PENETRATING
         if node[k, S_MODE] == TOUCHED:
             x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
             before = k
             continue
+        # an untouched row: `wrap` tests the segment and leaves the row FREE where it is clear
         after, qx, qy, qz = _next_contact(k, hi, ends, node)
         held = wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, True)
         if held != 0:
+            # an end counts as inside only where it is the span's; contact points may lie below another surface
             if (held & A_INSIDE and before < 0) or (held & B_INSIDE and after == hi):
                 status = lay.ENDPOINT_INSIDE
             elif status == lay.CONVERGED:

@@ -1,4 +1,8 @@
-"""Chains and motions: spans between via points put together, one pose or a whole sweep in one compiled loop."""
+"""Chains and motions: the spans between via points solved one after another, for one pose or for a whole sweep.
+
+A chain runs from its origin over obstacles and via points to its insertion. A via point divides it: what is on one side
+does not depend on the other.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,11 @@ from mjwrap.kernels._jit import allocating, jit
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.table import known
 from mjwrap.kernels.spans.cold_start import path_length
-from mjwrap.kernels.spans.end_inside import has_length
+from mjwrap.kernels.spans.end_inside import has_valid_length
 from mjwrap.kernels.spans.large_moves import solve_span
-from mjwrap.kernels.tangency.certify import minimal
-from mjwrap.kernels.tangency.newton import evaluate
-from mjwrap.kernels.wraps.held_inside import hold_inside
+from mjwrap.kernels.tangency.certify import is_local_minimum
+from mjwrap.kernels.tangency.tangency_error import evaluate
+from mjwrap.kernels.wraps.held_inside import solve_held_inside
 
 KIND, POS, ROT = lay.KIND, lay.POS, lay.ROT
 S_MODE, S_ARC = lay.S_MODE, lay.S_ARC
@@ -28,13 +32,14 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     """Find the path from (ox, oy, oz) to (ix, iy, iz) over nodes lo..hi; results go to info[row].
 
     Points in the world frame [m]. The rows hold the last evaluation relative to the first point. Never raises and
-    never leaves NaN in `info`: where no path is found the status says why and the length is that of what stands in for
-    it (`foot.has_length`), else of the last iterate, or of straight lines where even that is not finite, NON_FINITE
-    ones left out.
+    never leaves NaN in `info`: where no path is found the status says why, and the length is that of the substitute
+    path where there is one (`end_inside.has_valid_length`), else of the last iterate, or of straight lines where even
+    that is not finite, NON_FINITE ones left out.
     """
     total, square = 0.0, 0.0
     status, iterations, evaluations = lay.CONVERGED, 0, 0
     ax, ay, az = 0.0, 0.0, 0.0
+    # the span start..k runs from A to B, both relative to the chain's origin
     start = lo
     strange = False  # whether the span has a surface of a kind that no kernel knows
     for k in range(lo, hi + 1):
@@ -57,7 +62,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
         else:
             ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
             if node[start, lay.INSIDE] > 0.0:
-                code, part, error, i = hold_inside(start, ends, node, tol)
+                code, part, error, i = solve_held_inside(start, ends, node, tol)
                 e = i
             else:
                 code, part, error, i, e = solve_span(start, k, ends, node, tol, direct)
@@ -65,6 +70,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
                 part, code = straight, lay.NOT_CONVERGED
             if not math.isfinite(error):
                 error = 1e300
+            # the first failure is reported, but for ENDPOINT_INSIDE, which may have a length all the same
             if status == lay.CONVERGED or (status == lay.ENDPOINT_INSIDE and code != lay.CONVERGED):
                 status = code
             total += part
@@ -98,7 +104,7 @@ def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
         ends = (ox, oy, oz, ax, ay, az, bx, by, bz)
         square += evaluate(start, k, ends, node)
-        if not minimal(start, k, node):
+        if not is_local_minimum(start, k, node):
             status = lay.NOT_MINIMAL
         total += path_length(start, k, ends, node)
         ax, ay, az = bx, by, bz
@@ -128,7 +134,10 @@ def set_rotation(node, k, w, x, y, z):
 
 @jit
 def extrapolate(node, before):
-    """Start from the straight continuation of the last two poses where both touch; keep the last in `before`."""
+    """Start from the straight continuation of the last two poses where both touch; keep the last in `before`.
+
+    P, t and s go on by what they changed from the pose before to the last one, P and t back on the surface.
+    """
     for k in range(node.shape[0]):
         both = node[k, S_MODE] == lay.TOUCHED and before[k, 0] == lay.TOUCHED and node[k, lay.INSIDE] == 0.0
         for i in range(lay.STATE):
@@ -137,15 +146,17 @@ def extrapolate(node, before):
                 node[k, S_MODE + i] = 2.0 * last - before[k, i]
             before[k, i] = last
         if both:
+            # a displacement by nothing projects P to the surface and t to its tangent plane
             displace(k, 0.0, 0.0, 0.0, 0.0, node)
+            # about to lift off: the extrapolated arc is no start
             if not node[k, S_ARC] > 0.0:
                 for i in range(lay.STATE):
                     node[k, S_MODE + i] = before[k, i]
 
 
 @jit
-def _repaired(node):
-    """Return whether a span of the last solve needed another start than the one that it was given."""
+def _was_repaired(node):
+    """Return whether a span of the last solve needed a repair, a start other than the one that it was given."""
     for k in range(node.shape[0]):
         if node[k, KIND] != lay.VIA and node[k, lay.W_REPAIRS] > 0.0:
             return True
@@ -153,7 +164,7 @@ def _repaired(node):
 
 
 @jit
-def _go_back(node, before):
+def _return_to_previous_pose(node, before):
     """Go back to the solution of the pose before."""
     for k in range(node.shape[0]):
         for i in range(lay.STATE):
@@ -182,13 +193,13 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
         x, y, z = origin[j, 0], origin[j, 1], origin[j, 2]
         u, v, w = insertion[j, 0], insertion[j, 1], insertion[j, 2]
         solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
-        if warm and j > 0 and _repaired(node):  # the straight continuation led astray
-            _go_back(node, before)
+        # the straight continuation may have led astray: solve once more from the pose before
+        if warm and j > 0 and _was_repaired(node):
+            _return_to_previous_pose(node, before)
             solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
-        if warm and not has_length(info[j, I_STATUS], info[j, I_ERROR]):
-            _go_back(node, before)
-            for k in range(
-                n
-            ):  # go on from the last pose that was solved, or cold from where an end was inside
+        if warm and not has_valid_length(info[j, I_STATUS], info[j, I_ERROR]):
+            # go on from the last pose that was solved, or cold from where an end was inside
+            _return_to_previous_pose(node, before)
+            for k in range(n):
                 if info[j, I_STATUS] == lay.ENDPOINT_INSIDE:
                     node[k, S_MODE] = lay.COLD

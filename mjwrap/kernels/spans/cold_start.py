@@ -1,4 +1,7 @@
-"""Finding a start: obstacle after obstacle wrapped in closed form, and the choice of sides where no hint makes it."""
+"""Cold starts: obstacle after obstacle is wrapped by itself, between its neighbours' contact points.
+
+Every such wrap shortens the path, and Newton's method polishes the result.
+"""
 
 from __future__ import annotations
 
@@ -12,25 +15,22 @@ KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_P, W_Q, W_OLD = lay.W_P, lay.W_Q, lay.W_OLD
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
-LEAST_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
-MOST_FLIPS = 3
-WINDOW = 4
-SWEEPS = 4
 SEARCH_EVERY = 6  # passes: a search costs as much as fifty wraps
 
 
 @jit
-def following(k, hi, ends, node, centred):
-    """Return the point at which the path meets what comes next after node k, relative to the base.
+def next_contact_point(k, hi, ends, node, centred):
+    """Return the contact point that comes next after node k, or the span's end B, relative to the base.
 
-    Before the first pass the hints of obstacles further on stand for their contact points; `centred`: so does the
-    centre of the next one.
+    Before the first pass the hints of obstacles further on are taken for their contact points; with `centred` the
+    centre of the next one is.
     """
     for j in range(k + 1, hi):
         if centred and node[j, S_MODE] == COLD and node[j, HINT] <= 0.0:
             return node[j, POS] - ends[0], node[j, POS + 1] - ends[1], node[j, POS + 2] - ends[2]
         if node[j, S_MODE] == TOUCHED:
             return node[j, W_P], node[j, W_P + 1], node[j, W_P + 2]
+        # not wrapped yet: its hint, from S to the world
         if node[j, S_MODE] == COLD and node[j, HINT] > 0.0:
             hx, hy, hz = node[j, HINT + 1], node[j, HINT + 2], node[j, HINT + 3]
             return (
@@ -50,15 +50,16 @@ def following(k, hi, ends, node, centred):
 
 
 @jit
-def relax(lo, hi, ends, node, passes, centred):
+def wrap_in_turn(lo, hi, ends, node, passes, centred):
     """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`.
 
     Lost contacts are searched for in some of the passes.
     """
+    # a Gauss-Seidel sweep: each obstacle already sees the new contact point of the one before it
     for i in range(passes):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
-            qx, qy, qz = following(k, hi, ends, node, centred)
+            qx, qy, qz = next_contact_point(k, hi, ends, node, centred)
             if i == 0:
                 node[k, lay.W_FRESH] = -1.0
             wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i % SEARCH_EVERY == 0)
@@ -82,23 +83,12 @@ def path_length(lo, hi, ends, node):
 
 
 @jit
-def keep(lo, hi, node, out, back):
-    """Copy the saved solutions of lo..hi to the columns `out`, or back from there."""
-    for j in range(lo, hi):
-        for i in range(lay.STATE):
-            if back:
-                node[j, S_MODE + i] = node[j, out + i]
-            else:
-                node[j, out + i] = node[j, S_MODE + i]
-
-
-@jit
-def between(lo, hi, first, last, ends, node):
-    """Return the ends of the part first..last of the path over lo..hi, from the contacts on both sides of it."""
+def ends_of_part(lo, hi, first, last, ends, node):
+    """Return the ends, as of a span, of the part first..last of a path: the contact points on both sides of it."""
     ax, ay, az = ends[3], ends[4], ends[5]
     for j in range(first - 1, lo - 1, -1):
         if node[j, S_MODE] == TOUCHED:
             ax, ay, az = node[j, W_Q], node[j, W_Q + 1], node[j, W_Q + 2]
             break
-    bx, by, bz = following(last - 1, hi, ends, node, False)
+    bx, by, bz = next_contact_point(last - 1, hi, ends, node, False)
     return (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)

@@ -1,7 +1,8 @@
-"""Which side: other ways round the surfaces of a row where no hint chooses them, at cold starts.
+"""Search for the sides on which a path passes its obstacles: cold starts without hints.
 
-A local search: another way is relaxed, where it comes near the present one it is pulled tight by Newton's method, and
-it is kept if it is shorter then. Ways that leave the surfaces' ranges cost more than any that does not.
+A local search over sides. Every trial is wrapped obstacle after obstacle; where it comes near the present path it is
+pulled tight by Newton's method, and it is kept if it is shorter then. Paths that leave the surfaces' ranges cost more
+than any that does not. "Sides and windings" in docs/derivation.md.
 """
 
 from __future__ import annotations
@@ -10,22 +11,22 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import jit
-from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.traits import branched, closed_form, drawn_hints
 from mjwrap.kernels.geometry.winding import TWO_PI
 from mjwrap.kernels.spans.active_set import (
-    MET,
-    drop,
+    MERGE_DISTANCE,
     follow_branch,
     in_range,
-    join,
-    release,
-    split,
-    take_in,
+    lift_off,
+    merge_contacts,
+    remove_contact,
+    split_at_hollow,
+    touchdown,
 )
-from mjwrap.kernels.spans.cold_start import between, keep, path_length, relax
-from mjwrap.kernels.tangency.certify import minimal
-from mjwrap.kernels.tangency.newton import UNKNOWN, newton
+from mjwrap.kernels.spans.cold_start import ends_of_part, path_length, wrap_in_turn
+from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions
+from mjwrap.kernels.tangency.certify import is_local_minimum
+from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
 
 KIND, SIZE, HINT = lay.KIND, lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
@@ -33,74 +34,72 @@ W_Q, W_OLD = lay.W_Q, lay.W_OLD
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 LEAST_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
-MOST_FLIPS = 3
-WINDOW = 4  # obstacles on both sides of those that change sides which follow
-SWEEPS = 4
-AVOIDED = 1e3  # is added to the length of a path that is none [m]
-CLOSE = 0.05  # another way that is longer by less, relatively, is pulled tight before it is given up
-TIGHT = 1e-6  # tangency error at which its length is known
-ROUNDS = 6  # changes of the set of touched obstacles on the way
-STEPS = 15  # of Newton's method
-TOGETHER = 5  # obstacles over which the string is thrown at once
-ONWARD = 3  # obstacles from one such group to the next
-BESIDE = 2  # obstacles on both sides that follow
-PATTERNS = 12  # of hints, where these are all
-FEWER = 8  # for each group of a longer row
-MORE = 4  # times as many while there is no path, or none in range
-DRAWN = 2.0  # flag of such a hint
-PASSED_BY = 0.25  # chance that an obstacle is passed by
+MOST_FLIPS = 3  # neighbours that change sides together
+WINDOW = 4  # obstacles to both sides of those that change sides that are free to follow
+MOST_SWEEPS = 4  # over the whole row
+PENALTY = 1e3  # is added to the length of a path that is out of range or not found [m]
+PROMISING = 0.05  # another way that is longer by less, relatively, is pulled tight before it is given up
+PULL_TOL = 1e-6  # tangency error at which its length is known
+MAX_CHANGES = 6  # of the set of touched obstacles while a path is pulled tight
+MAX_NEWTON = 15  # steps of Newton's method between two changes
+GROUP = 5  # neighbours that get random hints at once
+GROUP_STRIDE = 3  # obstacles from one such group to the next
+NEIGHBOURS = 2  # obstacles to both sides of a group that are free to follow
+PATTERNS = 12  # of hints that are tried where the row is one group
+PATTERNS_PER_GROUP = 8  # for each group of a longer row
+EXTRA_PATTERNS = 4  # times as many while there is no path, or none in range
+RANDOM_HINT = 2.0  # flag of a random hint, so that it can be taken back
+UNTOUCHED_CHANCE = 0.25  # that a pattern leaves an obstacle untouched
 
 
 @jit
-def settle(lo, hi, ends, node):
-    """Pull the path over lo..hi tight, from what it touches now; return whether it is one, and the evaluations."""
+def pull_tight(lo, hi, ends, node):
+    """Make the path over lo..hi tangent, from what it touches now; return whether it is certified, and the evaluations.
+
+    What `span.solve_active_set` does, without its repairs and to a lower tolerance: a trial that fails is given up.
+    """
     spent = 0
-    for _ in range(ROUNDS):
-        error, _, e = newton(lo, hi, ends, node, TIGHT, STEPS, UNKNOWN)
+    for _ in range(MAX_CHANGES):
+        error, _, e = newton(lo, hi, ends, node, PULL_TOL, MAX_NEWTON, NOT_EVALUATED)
         spent += e
-        if not error <= TIGHT or not follow_branch(lo, hi, node):
+        if not error <= PULL_TOL or not follow_branch(lo, hi, node):
             return False, spent
-        if not minimal(lo, hi, node):
-            if split(lo, hi, ends, node) == 0:
+        if not is_local_minimum(lo, hi, node):
+            if split_at_hollow(lo, hi, ends, node) == 0:
                 return False, spent
             continue
-        dropped = drop(lo, hi, node) + join(lo, hi, ends, node, MET)
-        added, status = take_in(lo, hi, ends, node)
+        dropped = lift_off(lo, hi, node) + merge_contacts(lo, hi, ends, node, MERGE_DISTANCE)
+        added, status = touchdown(lo, hi, ends, node)
         if dropped + added == 0:
             return status == lay.CONVERGED, spent
     return False, spent
 
 
 @jit
-def _cost(first, last, part, node):
-    """Return the length of the path over first..last, and what keeps it off contacts where a surface has ended [m]."""
+def _penalised_length(first, last, part, node):
+    """Return the length of the path over first..last, with a penalty where a contact is out of range [m]."""
     length = path_length(first, last, part, node)
-    return length if in_range(first, last, part, node) else length + AVOIDED
+    return length if in_range(first, last, part, node) else length + PENALTY
 
 
 @jit
-def _shorter(first, last, part, node, before, passes):
-    """Relax another way over first..last, pull it tight if it comes near; return if it is shorter, and evaluations."""
-    spent = relax(first, last, part, node, passes, False)
-    if not path_length(first, last, part, node) < before * (1.0 + CLOSE):
+def _try_part(first, last, part, node, before, passes):
+    """Try a start over first..last: return whether its path is shorter than `before` [m], and the evaluations spent."""
+    spent = wrap_in_turn(first, last, part, node, passes, False)
+    # wraps in turn leave it a little too long; only what is nearly as short is worth Newton's method
+    if not path_length(first, last, part, node) < before * (1.0 + PROMISING):
         return False, spent
-    good, e = settle(first, last, part, node)
-    return good and _cost(first, last, part, node) < before * (1.0 - 1e-9), spent + e
+    good, e = pull_tight(first, last, part, node)
+    return good and _penalised_length(first, last, part, node) < before * (1.0 - 1e-9), spent + e
 
 
 @jit
-def _take_back(first, last, ends, node, column):
-    """Restore the saved solutions of first..last from the columns `column`."""
-    keep(first, last, node, column, True)
-    for j in range(first, last):
-        if node[j, S_MODE] == TOUCHED:
-            geodesic(j, node, ends[0], ends[1], ends[2])
+def _can_change_side(k, node):
+    """Return whether obstacle k may be passed on its other side.
 
-
-@jit
-def _flips(k, node):
-    """Return whether obstacle k may be passed on its other side: a topological one, known in closed form, that no hint
-    chooses, and that is swept by so much that the other way can be shorter, or touched beyond its end."""
+    A topological side, known in closed form, that no hint chooses, on an obstacle that is swept by so much that the
+    other way can be shorter, or touched beyond its end.
+    """
     if not (branched(k, node) and closed_form(k, node)) or node[k, HINT] > 0.0:
         return False
     if node[k, S_MODE] != TOUCHED:
@@ -109,7 +108,7 @@ def _flips(k, node):
 
 
 @jit
-def _searchable(k, node):
+def _can_be_searched(k, node):
     """Return whether another wrap of obstacle k can be looked for: it is touched, and no hint chooses its side."""
     if closed_form(k, node) or node[k, HINT] > 0.0 or node[k, lay.TOUCH] > 0.0:
         return False
@@ -117,28 +116,29 @@ def _searchable(k, node):
 
 
 @jit
-def _release_further(k, node):
-    """Let go of the further touches of the surface whose first row is k."""
+def _remove_further_contacts(k, node):
+    """Remove the further contacts of the surface whose first row is k."""
     k += 1
     while k < node.shape[0] and node[k, lay.TOUCH] > 0.0:
-        release(k, node)
+        remove_contact(k, node)
         k += 1
 
 
 @jit
-def _other_way(first, last, node):
+def _change_sides(first, last, node):
     """Change the sides of the obstacles first..last, or have them searched for anew."""
     for j in range(first, last):
-        if _flips(j, node):
+        if _can_change_side(j, node):
+            # the other way round is a whole turn less, or more
             node[j, S_SWEEP] -= math.copysign(TWO_PI, node[j, S_SWEEP])
-        elif _searchable(j, node):
+        elif _can_be_searched(j, node):
             node[j, S_MODE] = COLD
-            _release_further(j, node)
+            _remove_further_contacts(j, node)
 
 
 @jit
-def _whole(lo, hi, first, last, node):
-    """Return the rows first..last within lo..hi, and those that belong to the same surfaces."""
+def _whole_surfaces(lo, hi, first, last, node):
+    """Return first and last, kept within lo..hi and moved so that all rows of a surface are in or out."""
     first, last = max(lo, first), min(hi, last)
     while node[first, lay.TOUCH] > 0.0:
         first -= 1
@@ -148,41 +148,42 @@ def _whole(lo, hi, first, last, node):
 
 
 @jit
-def shorten(lo, hi, ends, node, passes):
-    """Try other sides for all obstacles without a hint; keep what is shorter.
+def try_other_sides(lo, hi, ends, node, passes):
+    """Try other sides for all obstacles without a hint, and keep what is shorter; return the evaluations spent.
 
     Sides known in closed form change in runs of up to MOST_FLIPS neighbours together; others are searched for anew,
     one at a time, between the contacts that their neighbours have now. The path WINDOW obstacles to both sides is free
-    to follow. Until nothing gets shorter: a local search, at cold starts only. Returns the evaluations spent.
+    to follow. Ends when nothing gets shorter: a local search, at cold starts only.
     """
     spent = 0
-    for _ in range(SWEEPS):
+    for _ in range(MOST_SWEEPS):
         changed = False
         for run in range(1, MOST_FLIPS + 1):
             for k in range(lo, hi - run + 1):
-                whole = _flips(k, node) and _flips(k + run - 1, node)
-                if not (whole or (run == 1 and _searchable(k, node))):
+                # a run may hold obstacles that stay as they are, but not at its ends
+                whole = _can_change_side(k, node) and _can_change_side(k + run - 1, node)
+                if not (whole or (run == 1 and _can_be_searched(k, node))):
                     continue
-                first, last = _whole(lo, hi, k - WINDOW, k + run + WINDOW, node)
-                part = between(lo, hi, first, last, ends, node)
-                before = _cost(first, last, part, node)
-                keep(first, last, node, W_OLD, False)
-                _other_way(k, k + run, node)
-                shorter, e = _shorter(first, last, part, node, before, passes)
+                first, last = _whole_surfaces(lo, hi, k - WINDOW, k + run + WINDOW, node)
+                part = ends_of_part(lo, hi, first, last, ends, node)
+                before = _penalised_length(first, last, part, node)
+                save_solutions(first, last, node, W_OLD)
+                _change_sides(k, k + run, node)
+                shorter, e = _try_part(first, last, part, node, before, passes)
                 spent += e
                 if shorter:
                     changed = True
                 else:
-                    _take_back(first, last, ends, node, W_OLD)
+                    restore_solutions(first, last, ends, node, W_OLD)
         if not changed or hi - lo == 1:
             break
-        spent += relax(lo, hi, ends, node, passes, False)
+        spent += wrap_in_turn(lo, hi, ends, node, passes, False)
     return spent
 
 
 @jit
-def _chance(pattern, k, of):
-    """Return a number in [0, 1) that looks random and is the same every time."""
+def _pseudo_random(pattern, k, of):
+    """Return a number in [0, 1) that looks random and is the same every time: paths are functions of the pose."""
     z = (pattern + 1) * 73856093 + (k + 1) * 19349663 + (of + 1) * 83492791
     for _ in range(2):
         z &= 0xFFFFFFFF
@@ -193,33 +194,35 @@ def _chance(pattern, k, of):
 
 @jit
 def _draw_hint(k, node, pattern, place_in_row):
-    """Start obstacle k from nothing with a hint drawn by chance, or leave it untouched."""
-    _release_further(k, node)
-    if _chance(pattern, place_in_row, 0) < PASSED_BY:
-        release(k, node)
+    """Start obstacle k cold with a random hint, or leave it untouched."""
+    # further contacts, behind hollows that are bridged, belong to the old path
+    _remove_further_contacts(k, node)
+    if _pseudo_random(pattern, place_in_row, 0) < UNTOUCHED_CHANCE:
+        remove_contact(k, node)
         if closed_form(k, node):
             node[k, S_MODE] = COLD
         return
     node[k, S_MODE] = COLD
     node[k, S_ARC] = 0.0
-    z = 2.0 * _chance(pattern, place_in_row, 1) - 1.0
-    angle = TWO_PI * _chance(pattern, place_in_row, 2)
+    # a direction evenly distributed on the sphere: z and the angle about it are
+    z = 2.0 * _pseudo_random(pattern, place_in_row, 1) - 1.0
+    angle = TWO_PI * _pseudo_random(pattern, place_in_row, 2)
     reach = node[k, SIZE]
     flat = reach * math.sqrt(1.0 - z * z)
-    node[k, HINT] = DRAWN
+    node[k, HINT] = RANDOM_HINT
     node[k, HINT + 1] = flat * math.cos(angle)
     node[k, HINT + 2] = flat * math.sin(angle)
     node[k, HINT + 3] = reach * z
 
 
 @jit
-def _throwable(k, node):
-    """Return whether a string may be thrown over obstacle k: no hint chooses its side."""
+def _may_be_hinted(k, node):
+    """Return whether obstacle k may get a random hint: it has none of its own."""
     return node[k, HINT] == 0.0 and node[k, lay.TOUCH] == 0.0 and drawn_hints(k, node)
 
 
 @jit
-def _past(k, hi, node):
+def _next_surface(k, hi, node):
     """Return the row of the next surface after row k."""
     k += 1
     while k < hi and node[k, lay.TOUCH] > 0.0:
@@ -228,10 +231,10 @@ def _past(k, hi, node):
 
 
 @jit
-def throw_over(lo, hi, ends, node, sound):
-    """Throw the string over a few neighbours at a time, along hints drawn by chance; keep what is shorter.
+def try_random_hints(lo, hi, ends, node, sound):
+    """Try random hints for a few neighbours at a time, and keep what is shorter; return the evaluations spent.
 
-    What lies beside them follows. sound: the present one is a path. Returns the evaluations spent.
+    Their neighbours follow. sound: the present path is certified.
     """
     spent = 0
     changed = False
@@ -239,49 +242,53 @@ def throw_over(lo, hi, ends, node, sound):
     k, end = lo, lo
     while end < hi:
         end = k
-        for _ in range(TOGETHER):
-            end = _past(end, hi, node)
-        most = PATTERNS if first_group and end == hi else FEWER
-        for pattern in range(MORE * most):
-            first, last = _whole(lo, hi, k - BESIDE, end + BESIDE, node)
-            part = between(lo, hi, first, last, ends, node)
-            before = _cost(first, last, part, node)
+        for _ in range(GROUP):
+            end = _next_surface(end, hi, node)
+        # more patterns as long as there is no path, or none in range
+        most = PATTERNS if first_group and end == hi else PATTERNS_PER_GROUP
+        for pattern in range(EXTRA_PATTERNS * most):
+            first, last = _whole_surfaces(lo, hi, k - NEIGHBOURS, end + NEIGHBOURS, node)
+            part = ends_of_part(lo, hi, first, last, ends, node)
+            before = _penalised_length(first, last, part, node)
             if not sound and first == lo and last == hi:
-                before += AVOIDED
-            if pattern >= most and before < AVOIDED:
+                before += PENALTY
+            if pattern >= most and before < PENALTY:
                 break
-            keep(first, last, node, W_OLD, False)
-            thrown = False
+            save_solutions(first, last, node, W_OLD)
+            # all of the group in every other pattern, about half of it in the others
+            hinted = False
             for j in range(k, end):
-                if _throwable(j, node) and (pattern % 2 == 0 or _chance(pattern, j - k, 3) < 0.5):
+                if _may_be_hinted(j, node) and (pattern % 2 == 0 or _pseudo_random(pattern, j - k, 3) < 0.5):
                     _draw_hint(j, node, pattern, j - k)
-                    thrown = True
-            if not thrown:
+                    hinted = True
+            if not hinted:
                 continue
-            spent += relax(first, last, part, node, 1, False)
+            # the first wrap uses the hints; from there on the path keeps its sides without them
+            spent += wrap_in_turn(first, last, part, node, 1, False)
             for j in range(k, end):
-                if node[j, HINT] == DRAWN:
+                if node[j, HINT] == RANDOM_HINT:
                     node[j, HINT] = 0.0
-            shorter, e = _shorter(first, last, part, node, before, 1)
+            shorter, e = _try_part(first, last, part, node, before, 1)
             spent += e
             if shorter:
                 changed = True
                 sound = True
             else:
-                _take_back(first, last, ends, node, W_OLD)
+                restore_solutions(first, last, ends, node, W_OLD)
         first_group = False
-        for _ in range(ONWARD):
-            k = _past(k, hi, node)
+        for _ in range(GROUP_STRIDE):
+            k = _next_surface(k, hi, node)
     if changed:
-        spent += shorten(lo, hi, ends, node, 1)
+        spent += try_other_sides(lo, hi, ends, node, 1)
     return spent
 
 
 @jit
-def search_rows(lo, hi, ends, node, passes):
-    """Start a row without hints in three ways, shorten each, throw the shortest over; return the evaluations spent.
+def search_sides(lo, hi, ends, node, passes):
+    """Find the sides of a row without hints; return the evaluations spent.
 
-    Between the ends, along the centres, and with the other side of everything that the first two have found.
+    Three starts are shortened: wraps between the span's ends, wraps along the obstacles' centres, and the other side of
+    everything that the shorter of these has. The shortest is pulled tight, then random hints are tried.
     """
     spent = 0
     best = math.inf
@@ -290,17 +297,17 @@ def search_rows(lo, hi, ends, node, passes):
             for k in range(lo, hi):
                 node[k, S_MODE] = COLD
         elif start == 2:
-            _other_way(lo, hi, node)
-        spent += relax(lo, hi, ends, node, passes, start == 1)
-        spent += shorten(lo, hi, ends, node, passes)
-        total = _cost(lo, hi, ends, node)
+            _change_sides(lo, hi, node)
+        spent += wrap_in_turn(lo, hi, ends, node, passes, start == 1)
+        spent += try_other_sides(lo, hi, ends, node, passes)
+        total = _penalised_length(lo, hi, ends, node)
         if total < best * (1.0 - 1e-9):
             best = total
-            keep(lo, hi, node, lay.W_BEST, False)
+            save_solutions(lo, hi, node, lay.W_BEST)
         else:
-            _take_back(lo, hi, ends, node, lay.W_BEST)
-    keep(lo, hi, node, lay.W_BEST, False)
-    good, e = settle(lo, hi, ends, node)
+            restore_solutions(lo, hi, ends, node, lay.W_BEST)
+    save_solutions(lo, hi, node, lay.W_BEST)
+    good, e = pull_tight(lo, hi, ends, node)
     if not good:
-        _take_back(lo, hi, ends, node, lay.W_BEST)
-    return spent + e + throw_over(lo, hi, ends, node, good)
+        restore_solutions(lo, hi, ends, node, lay.W_BEST)
+    return spent + e + try_random_hints(lo, hi, ends, node, good)

@@ -1,1 +1,1 @@
-"""The tangency conditions of a span: residuals, their Jacobian, Newton's method, and the certificate of a solution."""
+"""The tangency conditions of a span: path error, its Jacobian, Newton's method, certificate."""

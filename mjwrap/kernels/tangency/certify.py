@@ -1,129 +1,145 @@
-"""What makes a tangent path a path of a taut string: the way it goes round, and that it cannot slip off sideways."""
+"""The certificate's second part: whether a tangent path is a local minimum of length, and which way down it is if not.
+
+At a tangent path the second variation of the length lives in sideways shifts x b_P and y b_Q of the contact points
+alone. Straight segments of length L add |x b_P - y b_Q|²/L, geodesics (a x² - 2xy + r' y²)/r. Eliminated from the
+origin on, it is a Riccati recursion in the stiffness against a sideways shift of each point, all before it free to
+follow:
+
+    at the first P    k = 1/L
+    along a geodesic  k_Q = (a' + k_P r') / (a + k_P r)
+    over a segment    k_P = 1/L - (b_Q·b_P)²/L² / (1/L + k_Q)
+
+The pivots a + k r and 1/L + k are all positive where the path is a minimum (Jacobi's condition for a whole row). See
+"The certificate" in docs/derivation.md.
+"""
 
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import inlined, jit
 
-KIND, DIM = lay.KIND, lay.DIM
-S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
-W_P, W_Q, W_BP, W_BQ, W_JAC = lay.W_P, lay.W_Q, lay.W_BP, lay.W_BQ, lay.W_JAC
-W_X, W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_X, lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
+S_MODE, TOUCHED, SIZE = lay.S_MODE, lay.TOUCHED, lay.SIZE
+W_BP, W_BQ, W_JAC, W_L, W_LQ, W_X, W_Y = lay.W_BP, lay.W_BQ, lay.W_JAC, lay.W_L, lay.W_LQ, lay.W_X, lay.W_Y
 
-STABLE = -1e-9  # smallest admitted stiffness against a sideways shift, as a share of the segment's own
-LEAST_PRESSURE = -1e-9  # of the normal curvature times the surface's size
+LEAST_STIFFNESS = (
+    -1e-9
+)  # smallest admitted stiffness against a sideways shift, as a share of the segment's own
+LEAST_CURVATURE = -1e-9  # smallest admitted normal curvature times the surface's size
 SHORTEST = 1e-12  # segments count as at least this long here [m]
 
 
+@inlined
+def _binormals_cosine(last, k, node):
+    """Return b_Q of obstacle `last` times b_P of obstacle k."""
+    return (
+        node[last, W_BQ] * node[k, W_BP]
+        + node[last, W_BQ + 1] * node[k, W_BP + 1]
+        + node[last, W_BQ + 2] * node[k, W_BP + 2]
+    )
+
+
 @jit
-def minimal(lo, hi, node):
+def is_local_minimum(lo, hi, node):
     """Return whether the path of the last evaluation is a local minimum of length.
 
-    At a tangent path the second variation lives in sideways shifts x b_P, y b_Q of the contact points alone:
-    straight segments add |x b_P - y b_Q|^2 / L, geodesics (a x^2 - 2 x y + r' y^2) / r. Eliminated from the origin
-    on, its pivots are a Riccati recursion in the stiffness c behind each point: the Jacobi field a + c r must stay
-    positive along every geodesic, and 1/L + c at every point that a straight segment leaves. Off the surface, the
-    string must not gain by lifting off: its normal curvature is nowhere negative.
+    Besides the sideways shifts, the string must not gain by lifting off: its normal curvature is nowhere negative.
     """
     last = -1
-    c = 0.0
+    stiffness = 0.0
     for k in range(lo, hi):
-        if node[k, S_MODE] != lay.TOUCHED:
+        if node[k, S_MODE] != TOUCHED:
             continue
-        over = 1.0 / max(node[k, W_L], SHORTEST)
+        # over the segment to P: of the origin, which is fixed, or of the obstacle before
+        segment = 1.0 / max(node[k, W_L], SHORTEST)
         if last < 0:
-            c = over
+            stiffness = segment
         else:
-            pivot = over + c
-            if pivot <= STABLE * over:
+            pivot = segment + stiffness
+            if pivot <= LEAST_STIFFNESS * segment:
                 return False
-            turn = (
-                node[last, W_BQ] * node[k, W_BP]
-                + node[last, W_BQ + 1] * node[k, W_BP + 1]
-                + node[last, W_BQ + 2] * node[k, W_BP + 2]
-            )
-            c = over - turn * turn * over * over / pivot
-        if node[k, lay.W_RMIN] <= 0.0 or node[k, lay.W_KMIN] < LEAST_PRESSURE / node[k, lay.SIZE]:
+            cosine = _binormals_cosine(last, k, node)
+            stiffness = segment - cosine * cosine * segment * segment / pivot
+        # a conjugate point within the geodesic, or a hollow
+        if node[k, lay.W_RMIN] <= 0.0 or node[k, lay.W_KMIN] < LEAST_CURVATURE / node[k, SIZE]:
             return False
-        field = node[k, W_JAC] + c * node[k, W_JAC + 2]
+        # along the geodesic to Q
+        field = node[k, W_JAC] + stiffness * node[k, W_JAC + 2]
         if field <= 0.0:
             return False
-        c = (node[k, W_JAC + 1] + c * node[k, W_JAC + 3]) / field
+        stiffness = (node[k, W_JAC + 1] + stiffness * node[k, W_JAC + 3]) / field
         last = k
     if last < 0:
         return True
-    over = 1.0 / max(node[last, W_LQ], SHORTEST)
-    return over + c > STABLE * over
+    # the last segment ends at the insertion, which is fixed
+    segment = 1.0 / max(node[last, W_LQ], SHORTEST)
+    return segment + stiffness > LEAST_STIFFNESS * segment
 
 
 @jit
-def slip(lo, hi, node, size):
-    """Write to columns W_Y + 1, W_Y + 2 a sideways variation (d1, d2) by which the path of the last evaluation
-    shortens.
+def shift_off_saddle(lo, hi, node, size):
+    """Write to W_Y + 1 and W_Y + 2 a variation (δ1, δ2) by which the path of the last evaluation gets shorter.
 
-    The second variation's pivots, as in `minimal`, with the shifts x, y of P and Q for unknowns; the first pivot that
-    is
-    not positive gives a direction of negative curvature, up to that obstacle. Scaled to `size`, in radii. Returns the
-    obstacle, or -1 where there is none.
+    The first pivot that is not positive, of those in `is_local_minimum`, gives a direction of negative curvature in the
+    shifts x, y of P and Q, up to that obstacle. Scaled to `size`, in radii. Returns that obstacle, or -1 where there is
+    none.
     """
     last = -1
-    c, turn = 0.0, 0.0
-    failed, far = -1, False
+    stiffness = 0.0
+    failed, at_q = -1, False
+    # forward: the recursion, and how the points before follow: y of `last` for x = 1 here (W_X), x for y = 1 (W_X + 1)
     for k in range(lo, hi):
-        if node[k, S_MODE] != lay.TOUCHED:
+        if node[k, S_MODE] != TOUCHED:
             continue
-        over = 1.0 / max(node[k, W_L], SHORTEST)
+        segment = 1.0 / max(node[k, W_L], SHORTEST)
         node[k, W_X] = 0.0
         if last < 0:
-            c = over
+            stiffness = segment
         else:
-            turn = (
-                node[last, W_BQ] * node[k, W_BP]
-                + node[last, W_BQ + 1] * node[k, W_BP + 1]
-                + node[last, W_BQ + 2] * node[k, W_BP + 2]
-            )
-            pivot = over + c
+            cosine = _binormals_cosine(last, k, node)
+            pivot = segment + stiffness
             if pivot <= 0.0:
-                failed, far = last, True
+                failed, at_q = last, True
                 break
-            node[k, W_X] = turn * over / pivot  # y of the last one that goes with x = 1 here
-            c = over - turn * turn * over * over / pivot
-        field = node[k, W_JAC] + c * node[k, W_JAC + 2]
+            node[k, W_X] = cosine * segment / pivot
+            stiffness = segment - cosine * cosine * segment * segment / pivot
+        field = node[k, W_JAC] + stiffness * node[k, W_JAC + 2]
         if field <= 0.0 or node[k, lay.W_RMIN] <= 0.0:
             failed = k
             break
-        node[k, W_X + 1] = 1.0 / field  # x that goes with y = 1
-        c = (node[k, W_JAC + 1] + c * node[k, W_JAC + 3]) / field
+        node[k, W_X + 1] = 1.0 / field
+        stiffness = (node[k, W_JAC + 1] + stiffness * node[k, W_JAC + 3]) / field
         last = k
-    if failed < 0 and last >= 0 and 1.0 / max(node[last, W_LQ], SHORTEST) + c <= 0.0:
-        failed, far = last, True
+    if failed < 0 and last >= 0 and 1.0 / max(node[last, W_LQ], SHORTEST) + stiffness <= 0.0:
+        failed, at_q = last, True
     if failed < 0:
         return -1
+    # backward: the shifts that go with one of the point whose pivot failed
     x, y = 1.0, 0.0
-    if far:
+    if at_q:
         x, y = node[failed, W_X + 1], 1.0
-    most = 0.0
+    largest = 0.0
     for k in range(failed, lo - 1, -1):
-        if node[k, S_MODE] != lay.TOUCHED:
+        if node[k, S_MODE] != TOUCHED:
             continue
-        node[k, lay.W_Y + 1] = x
+        # x = δ1 and y = a δ1 + r δ2
+        node[k, W_Y + 1] = x
         r = node[k, W_JAC + 2]
-        node[k, lay.W_Y + 2] = (y - node[k, W_JAC] * x) / r if abs(r) > SHORTEST else 0.0
-        most = max(most, max(abs(x), abs(y)) / node[k, lay.SIZE])
+        node[k, W_Y + 2] = (y - node[k, W_JAC] * x) / r if abs(r) > SHORTEST else 0.0
+        largest = max(largest, max(abs(x), abs(y)) / node[k, SIZE])
         y = node[k, W_X] * x
-        x = node[_before(k, lo, node), W_X + 1] * y
+        x = node[_touched_before(k, lo, node), W_X + 1] * y
     for k in range(lo, hi):
-        if node[k, S_MODE] == lay.TOUCHED:
-            scale = size / most if k <= failed else 0.0
-            node[k, lay.W_Y + 1] *= scale
-            node[k, lay.W_Y + 2] = min(max(node[k, lay.W_Y + 2] * scale, -1.0), 1.0)
+        if node[k, S_MODE] == TOUCHED:
+            scale = size / largest if k <= failed else 0.0
+            node[k, W_Y + 1] *= scale
+            node[k, W_Y + 2] = min(max(node[k, W_Y + 2] * scale, -1.0), 1.0)
     return failed
 
 
 @jit
-def _before(k, lo, node):
+def _touched_before(k, lo, node):
     """Return the touched node before k, or k."""
     for j in range(k - 1, lo - 1, -1):
-        if node[j, S_MODE] == lay.TOUCHED:
+        if node[j, S_MODE] == TOUCHED:
             return j
     return k

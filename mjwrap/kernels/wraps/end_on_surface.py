@@ -1,9 +1,9 @@
-"""A single wrap polished, also where an end of the string lies on the surface or little above it.
+"""Polishing of a single wrap by Newton's method, also where an end of the string lies on or little above the surface.
 
 There the straight segment between end and contact is as short as the tangent from the end, sqrt(2 h / kappa): a
-length that Newton's method oversteps. So the end is moved onto the surface first and the contact to it, which leaves
+length that Newton's method oversteps. So a low end is moved onto the surface first and the contact to it, which leaves
 two unknowns, the geodesic's direction and length; then the contact slides on by the tangent. Which directions lead to
-the other end is found by shooting geodesics all round.
+the other end is found by shooting geodesics all round. "Low ends" in docs/derivation.md.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.table import height, project
 from mjwrap.kernels.geometry.vectors import unit
-from mjwrap.kernels.tangency.certify import minimal
-from mjwrap.kernels.tangency.newton import UNKNOWN, newton
-from mjwrap.kernels.wraps.half_planes import across
+from mjwrap.kernels.tangency.certify import is_local_minimum
+from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
+from mjwrap.kernels.wraps.half_planes import perpendicular
 from mjwrap.kernels.wraps.ruled import INSIDE
 
 SIZE, POS, ROT = lay.SIZE, lay.POS, lay.ROT
@@ -28,103 +28,110 @@ W_P, W_Q, W_TQ, W_NQ, W_BQ = lay.W_P, lay.W_Q, lay.W_TQ, lay.W_NQ, lay.W_BQ
 FROM_A, TO_B = 0, 1
 
 LOCAL_TOL = 1e-5  # tangency error of a single wrap: all of them are polished together
-LOCAL_STEPS = 15
-BESIDE = 0.01  # an end that lies lower above a surface, in its size, is beside it
-NEXT = 0.3  # a contact nearer to such an end, in the surface's size, is next to it
-ROUND = 36  # geodesics shot from an end
-REFINEMENTS = 4  # between two of them
-STRAIGHT = 0.02  # a geodesic that misses the other end by less is polished [rad]
-MOST_ASIDE = 0.3  # and one that misses it by more after all refinements is none
-MOST_MISS = 2.5  # neighbours that differ by more do not enclose one that hits
-MARCH = 0.35  # step along them, in the surface's size
-MARCHES = 20
-MOST_WAYS = 12
+LOCAL_STEPS = 15  # of Newton's method
+LOW_END = 0.01  # an end is low where it lies lower above the surface than this, in its size
+NEAR_END = 0.3  # a contact nearer to a low end, in the surface's size, is moved to it
+SHOTS = 36  # geodesics shot from an end
+REFINEMENTS = 4  # of the direction between two of them
+GOOD_MISS = 0.02  # a geodesic that misses the other end by less is polished [rad]
+MOST_MISS_LEFT = 0.3  # and one that misses it by more after all refinements is none
+MOST_DIFFERENCE = 2.5  # neighbours that differ by more do not enclose one that hits
+MARCH_STEP = 0.35  # along a geodesic that is shot, in the surface's size
+MOST_MARCH_STEPS = 20
+MOST_SHOTS = 12
 
 
 @jit
-def beside(k, node):
-    """Return below which height an end lies beside the surface [m]."""
-    return BESIDE * node[k, SIZE]
+def low_end_height(k, node):
+    """Return the height over obstacle k's surface below which an end is low [m]."""
+    return LOW_END * node[k, SIZE]
 
 
 @jit
 def polish(k, ends, node, known):
-    """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length.
+    """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length [m].
 
-    known: what the row holds of its start, UNKNOWN or GEODESICS.
+    known: what the row holds of its start, NOT_EVALUATED or GEODESICS_EVALUATED.
     """
     error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, known)
+    # where the row holds this evaluation to the end, a solve that follows need not repeat it
     node[k, lay.W_FRESH] = error * error
-    if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and minimal(k, k + 1, node)):
+    if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and is_local_minimum(k, k + 1, node)):
         return False, 0.0
     return True, node[k, lay.W_L] + node[k, S_ARC] + node[k, lay.W_LQ]
 
 
 @jit
-def polish_beside(k, ends, node, high_a, high_b):
+def polish_from_low_ends(k, ends, node, high_a, high_b):
     """Polish a guess whose ends lie high_a and high_b above the surface; return what `polish` does [m]."""
-    reach = NEXT * node[k, SIZE]
-    if high_a > beside(k, node) and high_b > beside(k, node):
-        return polish(k, ends, node, UNKNOWN)
+    reach = NEAR_END * node[k, SIZE]
+    if high_a > low_end_height(k, node) and high_b > low_end_height(k, node):
+        return polish(k, ends, node, NOT_EVALUATED)
     geodesic(k, node, ends[0], ends[1], ends[2])
-    before, behind = _gap(k, node, W_P, ends, 3), _gap(k, node, W_Q, ends, 6)
-    from_a = high_a <= beside(k, node) and before <= reach
-    to_b = high_b <= beside(k, node) and behind <= reach
+    before, behind = _distance_to_end(k, node, W_P, ends, 3), _distance_to_end(k, node, W_Q, ends, 6)
+    from_a = high_a <= low_end_height(k, node) and before <= reach
+    to_b = high_b <= low_end_height(k, node) and behind <= reach
     if not (from_a or to_b):
-        return polish(k, ends, node, UNKNOWN)
+        return polish(k, ends, node, NOT_EVALUATED)
+    # the guess, in case Newton's method fails with the ends on the surface
     guess = carray(stack(), (80,))
     for i in range(lay.STATE):
         guess[i] = node[k, S_MODE + i]
     if from_a:
-        _, px, py, pz, _, _, _ = moved_onto(k, node, ends, 3, True)
+        _, px, py, pz, _, _, _ = end_onto_surface(k, node, ends, 3, True)
         node[k, S_P] = px
         node[k, S_P + 1] = py
         node[k, S_P + 2] = pz
         displace(k, 0.0, 0.0, 0.0, before, node)
-    good, total = _land(k, ends, node, from_a, to_b, high_a, high_b)
+    good, total = _polish_on_surface(k, ends, node, from_a, to_b, high_a, high_b)
     if good:
         return good, total
     for i in range(lay.STATE):
         node[k, S_MODE + i] = guess[i]
-    return polish(k, ends, node, UNKNOWN)
+    return polish(k, ends, node, NOT_EVALUATED)
 
 
 @jit
-def polish_landed(k, ends, node, side, high_a, high_b, angle, arc):
-    """Polish a geodesic that `shoot` found from A (side FROM_A) or from B (TO_B); return what `polish` does [m]."""
-    _, px, py, pz, _, _, _ = moved_onto(k, node, ends, 3 if side == FROM_A else 6, True)
-    _aim(k, node, px, py, pz, angle, arc)
+def polish_shot(k, ends, node, side, high_a, high_b, angle, arc):
+    """Polish a geodesic that `shoot_geodesics` found from side FROM_A or TO_B; return what `polish` does."""
+    _, px, py, pz, _, _, _ = end_onto_surface(k, node, ends, 3 if side == FROM_A else 6, True)
+    _start_geodesic(k, node, px, py, pz, angle, arc)
+    # shot from B, it is the path backwards: start where it ends, and turn it round
     if side == TO_B:
-        _advance(k, node, ends, arc)
+        _move_start_along(k, node, ends, arc)
         for i in range(3):
             node[k, S_T + i] = -node[k, S_T + i]
         node[k, S_ARC] = arc
-    return _land(k, ends, node, side == FROM_A, side == TO_B, high_a, high_b)
+    return _polish_on_surface(k, ends, node, side == FROM_A, side == TO_B, high_a, high_b)
 
 
 @jit
-def _land(k, ends, node, from_a, to_b, high_a, high_b):
-    """Polish a guess with the ends on the surface that lie beside it, then with the ends where they are."""
-    _, _, _, _, ax, ay, az = moved_onto(k, node, ends, 3, from_a)
-    _, _, _, _, bx, by, bz = moved_onto(k, node, ends, 6, to_b)
+def _polish_on_surface(k, ends, node, from_a, to_b, high_a, high_b):
+    """Polish a guess with its low ends on the surface, then with the ends where they are.
+
+    from_a, to_b: whether A, whether B is such an end.
+    """
+    _, _, _, _, ax, ay, az = end_onto_surface(k, node, ends, 3, from_a)
+    _, _, _, _, bx, by, bz = end_onto_surface(k, node, ends, 6, to_b)
     node[k, lay.W_LAND] = 1.0 if to_b else 0.0
     flat = (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
-    error, _, _ = newton(k, k + 1, flat, node, LOCAL_TOL, LOCAL_STEPS, UNKNOWN)
+    error, _, _ = newton(k, k + 1, flat, node, LOCAL_TOL, LOCAL_STEPS, NOT_EVALUATED)
     node[k, lay.W_LAND] = 0.0
     if not (error <= LOCAL_TOL and node[k, S_ARC] > 0.0):
         return False, 0.0
+    # an end h above the surface leaves a straight segment about sqrt(2 h / κ) long before the contact
     arc = node[k, S_ARC]
     bend_p, bend_q = node[k, lay.W_KP], node[k, lay.W_KQ]
     if from_a and bend_p > 0.0:
-        _advance(k, node, ends, min(math.sqrt(2.0 * max(high_a, 0.0) / bend_p), arc))
+        _move_start_along(k, node, ends, min(math.sqrt(2.0 * max(high_a, 0.0) / bend_p), arc))
     if to_b and bend_q > 0.0:
         node[k, S_ARC] = max(node[k, S_ARC] - math.sqrt(2.0 * max(high_b, 0.0) / bend_q), 0.0)
-    return polish(k, ends, node, UNKNOWN)
+    return polish(k, ends, node, NOT_EVALUATED)
 
 
 @jit
-def _advance(k, node, ends, way):
-    """Move the start of obstacle k's geodesic on along it, its end staying [m]."""
+def _move_start_along(k, node, ends, way):
+    """Move the start of obstacle k's geodesic along it by `way` [m]; its end stays."""
     if not way > 0.0:
         return
     arc = node[k, S_ARC]
@@ -147,7 +154,7 @@ def _advance(k, node, ends, way):
 
 
 @jit
-def _gap(k, node, column, ends, end):
+def _distance_to_end(k, node, column, ends, end):
     """Return the distance from a contact to an end of the string [m]."""
     x, y, z = (
         node[k, column] - ends[end],
@@ -158,8 +165,8 @@ def _gap(k, node, column, ends, end):
 
 
 @jit
-def moved_onto(k, node, ends, column, moves):
-    """Return an end of the string, moved onto the surface where it lies inside or `moves`.
+def end_onto_surface(k, node, ends, column, moves):
+    """Return an end of the string, moved onto the surface where it lies inside, and where `moves` says so.
 
     First its height above the surface before [m], then the point in S, then relative to the base.
     """
@@ -178,10 +185,10 @@ def moved_onto(k, node, ends, column, moves):
 
 
 @jit
-def _aim(k, node, px, py, pz, angle, arc):
-    """Start a geodesic at a surface point, in a direction by its angle about the normal there."""
+def _start_geodesic(k, node, px, py, pz, angle, arc):
+    """Start a geodesic at a surface point, in a direction given by its angle about the normal there [rad]."""
     px, py, pz, nx, ny, nz = project(node, k, px, py, pz)
-    ux, uy, uz = across(nx, ny, nz)
+    ux, uy, uz = perpendicular(nx, ny, nz)
     c, s = math.cos(angle), math.sin(angle)
     tx, ty, tz = unit(
         c * ux + s * (ny * uz - nz * uy), c * uy + s * (nz * ux - nx * uz), c * uz + s * (nx * uy - ny * ux)
@@ -197,8 +204,8 @@ def _aim(k, node, px, py, pz, angle, arc):
 
 
 @jit
-def _rise(k, node, ends, end):
-    """Return how high the string's end lies above the tangent plane where obstacle k's geodesic ends now [m]."""
+def _height_over_tangent_plane(k, node, ends, end):
+    """Return how high the string's end lies over the tangent plane at the present end of obstacle k's geodesic [m]."""
     geodesic(k, node, ends[0], ends[1], ends[2])
     return (
         node[k, W_NQ] * (ends[end] - node[k, W_Q])
@@ -208,34 +215,36 @@ def _rise(k, node, ends, end):
 
 
 @jit
-def _miss(k, node, px, py, pz, angle, ends, end):
-    """Follow the geodesic that leaves a surface point at an angle to where the string's other end comes into sight.
+def _follow_to_sight(k, node, px, py, pz, angle, ends, end):
+    """Follow the geodesic that leaves a surface point at an angle, until the string's other end comes into sight.
 
-    Returns whether it does, the arc length there [m], and by what angle it lies aside of the geodesic [rad].
+    In sight means over the tangent plane. Returns whether it does, the arc length there [m], and the angle between the
+    geodesic's tangent and the direction to that end, seen along the normal [rad].
     """
-    _aim(k, node, px, py, pz, angle, 0.0)
-    step = MARCH * node[k, SIZE]
-    low = _rise(k, node, ends, end)
+    _start_geodesic(k, node, px, py, pz, angle, 0.0)
+    step = MARCH_STEP * node[k, SIZE]
+    low = _height_over_tangent_plane(k, node, ends, end)
     if not low < 0.0:
         return False, 0.0, 0.0
     node[k, S_ARC] = step
     high = 0.0
     way = 0.0
-    for _ in range(MARCHES):
-        high = _rise(k, node, ends, end)
+    for _ in range(MOST_MARCH_STEPS):
+        high = _height_over_tangent_plane(k, node, ends, end)
         if high >= 0.0:
             break
         low = high
         way += step
-        _advance(k, node, ends, step)
+        _move_start_along(k, node, ends, step)
         node[k, S_ARC] = step
     if high < 0.0:
         return False, 0.0, 0.0
+    # within the last step: regula falsi, the Illinois way
     first, last = 0.0, step
     for _ in range(3):
         middle = (first * high - last * low) / (high - low)
         node[k, S_ARC] = middle
-        at = _rise(k, node, ends, end)
+        at = _height_over_tangent_plane(k, node, ends, end)
         if at >= 0.0:
             last, high = middle, at
             low *= 0.5
@@ -251,24 +260,31 @@ def _miss(k, node, px, py, pz, angle, ends, end):
 
 
 @jit
-def shoot(k, ends, node, side, ways):
-    """Find the geodesics from A (side FROM_A) or B (TO_B), beside the surface, whose tangents lead to the other end.
+def shoot_geodesics(k, ends, node, side, ways):
+    """Find the geodesics from a low end A (side FROM_A) or B (TO_B) whose tangents lead to the other end.
 
     Writes angle and arc length of each to `ways` [rad, m], near enough for Newton's method; returns how many.
     """
     start, end = (3, 6) if side == FROM_A else (6, 3)
-    _, px, py, pz, _, _, _ = moved_onto(k, node, ends, start, True)
+    _, px, py, pz, _, _, _ = end_onto_surface(k, node, ends, start, True)
     count = 0
     seen, before = False, 0.0
-    for i in range(ROUND + 1):
-        angle = i * (2.0 * math.pi / ROUND)
-        sees, _, miss = _miss(k, node, px, py, pz, angle, ends, end)
-        if sees and seen and miss * before <= 0.0 and abs(miss - before) < MOST_MISS and count < MOST_WAYS:
-            first, last, low, high = angle - 2.0 * math.pi / ROUND, angle, before, miss
+    for i in range(SHOTS + 1):
+        angle = i * (2.0 * math.pi / SHOTS)
+        in_sight, _, miss = _follow_to_sight(k, node, px, py, pz, angle, ends, end)
+        # the miss changes its sign between this direction and the one before: one that hits is enclosed
+        if (
+            in_sight
+            and seen
+            and miss * before <= 0.0
+            and abs(miss - before) < MOST_DIFFERENCE
+            and count < MOST_SHOTS
+        ):
+            first, last, low, high = angle - 2.0 * math.pi / SHOTS, angle, before, miss
             for _ in range(REFINEMENTS):  # regula falsi, the Illinois way
                 middle = first + (last - first) * low / (low - high) if low != high else first
-                sees, arc, at = _miss(k, node, px, py, pz, middle, ends, end)
-                if not sees or abs(at) < STRAIGHT:
+                in_sight, arc, at = _follow_to_sight(k, node, px, py, pz, middle, ends, end)
+                if not in_sight or abs(at) < GOOD_MISS:
                     break
                 if at * high > 0.0:
                     last, high = middle, at
@@ -276,10 +292,10 @@ def shoot(k, ends, node, side, ways):
                 else:
                     first, low = middle, at
                     high *= 0.5
-            if sees and abs(at) < MOST_ASIDE:
+            if in_sight and abs(at) < MOST_MISS_LEFT:
                 ways[2 * count] = middle
                 ways[2 * count + 1] = arc
                 count += 1
-            sees = True
-        seen, before = sees, miss
+            in_sight = True
+        seen, before = in_sight, miss
     return count

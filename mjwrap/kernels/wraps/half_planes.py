@@ -1,9 +1,9 @@
 """First guesses for wraps without a closed form, in a half plane that is bounded by the line AB.
 
-The surface has a section with the half plane, and the shortest way over it is the convex hull over its upper
-boundary: right to
-the sampling of the boundary, for any surface that has a height. An ellipsoid's section is an ellipse, with tangents in
-closed form. Everything in the frame S of the obstacle.
+The surface has a section with the half plane, and the shortest way over it is the convex hull over its upper boundary:
+right to the sampling of the boundary, for any surface that has a height. An ellipsoid's section is an ellipse, with
+tangents in closed form. Everything in the frame S of the obstacle. "Wraps without a closed form" in
+docs/derivation.md.
 """
 
 from __future__ import annotations
@@ -23,24 +23,25 @@ KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
 S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
 
 COLUMNS = 14  # samples of a section's upper boundary
-EVEN = 1e-4  # to which a section's boundary is found, in the surface's size
-LIFTS = 3  # corrections where the way over a section meets more of it
-BRIDGE = (
+BOUNDARY_TOL = 1e-4  # to which a section's boundary is found, in the surface's size
+MOST_LIFTS = 3  # corrections where the way over a section meets more of it
+HOLLOW_HEIGHT = (
     0.1  # a string that stands off the surface so high, in its size, between two columns bridges a hollow
 )
-NEAR = 1e-4  # a section that begins so near to A, in the surface's size, begins at A
-MARCH = 60  # steps to a section's boundary
+AT_A = 1e-4  # a section that begins so near to A, in the surface's size, begins at A
+MOST_CLIMB_STEPS = 60  # steps to a section's boundary
 GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # of an arc of an ellipse, for a guess
 
 
 @jit
-def _climb(node, k, x, y, z, wx, wy, wz, start):
-    """Return how far along w the surface is left, from a start inside it (x, y, z: the column's foot)."""
+def _boundary_height(node, k, x, y, z, wx, wy, wz, start):
+    """Return how far from (x, y, z) along w a column leaves the surface, from a start inside it."""
+    # march outwards by at least the depth, which cannot go too far where the height is a distance
     lo = start
     step = 0.05 * node[k, SIZE]
     h = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
     hi = lo
-    for _ in range(MARCH):
+    for _ in range(MOST_CLIMB_STEPS):
         hi = lo + max(-h, step)
         h = height(node, k, x + hi * wx, y + hi * wy, z + hi * wz)
         if h >= 0.0:
@@ -49,7 +50,7 @@ def _climb(node, k, x, y, z, wx, wy, wz, start):
         step *= 1.2
     low = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
     for _ in range(8):  # regula falsi, the Illinois way
-        if h <= EVEN * node[k, SIZE]:
+        if h <= BOUNDARY_TOL * node[k, SIZE]:
             break
         middle = (lo * h - hi * low) / (h - low)
         g = height(node, k, x + middle * wx, y + middle * wy, z + middle * wz)
@@ -63,10 +64,8 @@ def _climb(node, k, x, y, z, wx, wy, wz, start):
 
 
 @jit
-def _hull(count, size, first, step, top, chain):
-    """Write the indices of the columns on the upper convex hull between (0, 0) and (size, 0) to chain; return how
-    many.
-    """
+def _upper_hull(count, size, first, step, top, chain):
+    """Write to chain the indices of the columns on the upper convex hull over (0, 0) and (size, 0); return how many."""
     m = 0
     for i in range(count + 1):
         x, y = first + i * step, 0.0
@@ -76,6 +75,7 @@ def _hull(count, size, first, step, top, chain):
                 continue
         else:
             x = size
+        # Andrew's monotone chain: drop the last corner as long as the string would not bend downwards there
         while m > 0:
             j = int(chain[m - 1])
             jx, jy = first + j * step, top[j]
@@ -93,16 +93,17 @@ def _hull(count, size, first, step, top, chain):
 
 
 @jit
-def _over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
+def _pull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
     """Sample the section at COLUMNS columns and pull a string over it; return the number of the hull's columns."""
     for i in range(COLUMNS):
         x = first + i * step
         px, py, pz = ax + x * ux, ay + x * uy, az + x * uz
         top[i] = -1.0
         if 0.0 < x < size and height(node, k, px, py, pz) < 0.0:
-            top[i] = _climb(node, k, px, py, pz, wx, wy, wz, 0.0)
-    m = _hull(COLUMNS, size, first, step, top, chain)
-    for _ in range(LIFTS):
+            top[i] = _boundary_height(node, k, px, py, pz, wx, wy, wz, 0.0)
+    m = _upper_hull(COLUMNS, size, first, step, top, chain)
+    # columns that end below the string may have more surface above: take the boundary from the string's height on
+    for _ in range(MOST_LIFTS):
         lifted = False
         j = 0
         for i in range(COLUMNS):
@@ -119,17 +120,20 @@ def _over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step
             y = ly + (ry - ly) * (x - lx) / (rx - lx)
             px, py, pz = ax + x * ux, ay + x * uy, az + x * uz
             if height(node, k, px + y * wx, py + y * wy, pz + y * wz) < -1e-6 * node[k, SIZE]:
-                top[i] = _climb(node, k, px, py, pz, wx, wy, wz, y)
+                top[i] = _boundary_height(node, k, px, py, pz, wx, wy, wz, y)
                 lifted = True
         if not lifted:
             break
-        m = _hull(COLUMNS, size, first, step, top, chain)
+        m = _upper_hull(COLUMNS, size, first, step, top, chain)
     return m
 
 
 @jit
 def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
-    """Do what `_guess` does in closed form: in the image in which the ellipsoid is a sphere the section is a circle."""
+    """Do what `guess_in_half_plane` does in closed form.
+
+    In the affine image in which the ellipsoid is the unit sphere the section is a circle, and tangents stay tangents.
+    """
     a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
     px, py, pz = ax / a, ay / b, az / c
     dx, dy, dz = size * ux / a, size * uy / b, size * uz / c
@@ -149,12 +153,14 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
     # directions of the normals at P and Q, as angles: tangents from A and B that pass over the circle
     start = math.atan2(-y, -x) - math.atan2(root_a, radius)
     stop = math.atan2(-y, far - x) + math.atan2(root_b, radius)
+    # a small negative arc is a string that is clear of the circle, not one that goes nearly all the way round
     arc = start - stop
     if arc > math.pi * 1.5:
         arc -= 2.0 * math.pi
     elif arc < -math.pi * 0.5:
         arc += 2.0 * math.pi
     arc = max(arc, 0.0)
+    # the arc's length on the ellipsoid, where it is an ellipse: Gauss' rule over the angle
     total = 0.0
     for i in range(GAUSS.shape[0]):
         g = start - 0.5 * arc * (1.0 + GAUSS[i])
@@ -166,12 +172,12 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
     px, py, pz = ax + a * (x * dx + y * vx), ay + b * (x * dy + y * vy), az + c * (x * dz + y * vz)
     x, y = math.sin(start), -math.cos(start)  # tangent there, and so is its image on the ellipsoid
     tx, ty, tz = a * (x * dx + y * vx), b * (x * dy + y * vy), c * (x * dz + y * vz)
-    place(k, node, px, py, pz, tx, ty, tz, 0.5 * arc * radius * total)
+    place_contact(k, node, px, py, pz, tx, ty, tz, 0.5 * arc * radius * total)
     return True
 
 
 @jit
-def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
+def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
     """Write a first guess for the string over the section with the half plane towards w; return whether there is one.
 
     u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest.
@@ -180,6 +186,7 @@ def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
         return _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size)
     memory = carray(stack(), (80,))
     top, chain = memory[0:COLUMNS], memory[COLUMNS : 2 * COLUMNS]
+    # the columns stand where the surface can be, at first, then closer together over the hull
     lo, hi = 0.0, size
     reach = bounding_radius(node, k)
     if reach < math.inf:
@@ -192,7 +199,7 @@ def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
             return False
         step = (hi - lo) / (COLUMNS - 2)
         first = deepest - step * math.ceil((deepest - lo) / step)  # one column stands at the deepest point
-        m = _over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain)
+        m = _pull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain)
         if m == 0:
             return False
         lo, hi = first + (chain[0] - 1) * step, first + (chain[m - 1] + 1) * step
@@ -202,22 +209,23 @@ def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
         i, o = int(chain[j]), int(chain[j - 1])
         x, y = first + 0.5 * (i + o) * step, 0.5 * (top[i] + top[o])
         px, py, pz = ax + x * ux + y * wx, ay + x * uy + y * wy, az + x * uz + y * wz
-        if i - o > 2 and height(node, k, px, py, pz) > BRIDGE * node[k, SIZE]:
+        if i - o > 2 and height(node, k, px, py, pz) > HOLLOW_HEIGHT * node[k, SIZE]:
             if node[k, lay.TOUCH] == 0.0:
                 stop = j
                 break
             start = j
+    # the first contact is the hull's first column, s the hull's length, t the direction of A's tangent
     arc = 0.0
     for j in range(start + 1, stop):
         i, o = int(chain[j]), int(chain[j - 1])
         arc += math.hypot((i - o) * step, top[i] - top[o])
     x, y = first + chain[start] * step, top[int(chain[start])]
     p, q = x, y
-    if math.hypot(x, y) < NEAR * node[k, SIZE]:  # A is on the surface: look ahead
+    if math.hypot(x, y) < AT_A * node[k, SIZE]:  # A is on the surface: look ahead
         p, q = size, 0.0
         if start + 1 < m:
             p, q = first + chain[start + 1] * step - x, top[int(chain[start + 1])] - y
-    place(
+    place_contact(
         k, node, ax + x * ux + y * wx, ay + x * uy + y * wy, az + x * uz + y * wz,
         p * ux + q * wx, p * uy + q * wy, p * uz + q * wz, arc,
     )  # fmt: skip
@@ -225,14 +233,14 @@ def guess(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
 
 
 @jit
-def place(k, node, x, y, z, tx, ty, tz, arc):
+def place_contact(k, node, x, y, z, tx, ty, tz, arc):
     """Start obstacle k's geodesic at the surface point next to (x, y, z), along t as far as it is tangent."""
     x, y, z, nx, ny, nz = project(node, k, x, y, z)
     along = tx * nx + ty * ny + tz * nz
     tx, ty, tz = tx - along * nx, ty - along * ny, tz - along * nz
     size = math.sqrt(tx * tx + ty * ty + tz * tz)
     if size < 1e-12 * node[k, SIZE]:
-        tx, ty, tz = across(nx, ny, nz)
+        tx, ty, tz = perpendicular(nx, ny, nz)
         size = 1.0
     node[k, S_MODE] = lay.TOUCHED
     node[k, S_P] = x
@@ -245,16 +253,16 @@ def place(k, node, x, y, z, tx, ty, tz, arc):
 
 
 @jit
-def place_on_tube(k, node, x, y, z, tx, ty, tz, angle):
+def place_contact_on_tube(k, node, x, y, z, tx, ty, tz, angle):
     """Start at the given angle round a torus' tube, where it is nearest to the point (x, y, z)."""
     major, minor = node[k, DIM], node[k, DIM + 1]
     rho = max(math.sqrt(x * x + y * y), 1e-12 * major)
     reach = (major + minor * math.cos(angle)) / rho
-    place(k, node, reach * x, reach * y, minor * math.sin(angle), tx, ty, tz, 0.0)
+    place_contact(k, node, reach * x, reach * y, minor * math.sin(angle), tx, ty, tz, 0.0)
 
 
 @jit
-def across(x, y, z):
+def perpendicular(x, y, z):
     """Return a unit vector at right angles to a unit vector."""
     if abs(x) <= abs(y) and abs(x) <= abs(z):
         x, y, z = 0.0, z, -y

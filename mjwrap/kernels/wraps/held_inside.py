@@ -1,4 +1,4 @@
-"""A string that is held to a solid sphere or cylinder: the shortest one that meets it (MuJoCo's side site inside).
+"""Strings that are held inside a sphere or cylinder: the shortest one that meets the solid (MuJoCo's inside wrap).
 
 It is straight where the straight line meets the solid, an end inside it included. Else it has one corner at the point
 P of the surface where the lengths |A - P| and |P - B| sum to least: both segments make the same angle with the normal
@@ -20,19 +20,21 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.vectors import rotate
-from mjwrap.kernels.tangency.newton import ON_SURFACE
+from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
 POS, S_P, W_P, W_Q, W_TP, W_TQ = lay.POS, lay.S_P, lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
-ENOUGH = 1e-28  # last step, squared, in radii and in the lengths of the segments
-LEAST = 1e-32  # as far as unit vectors can tell
-SMALL = 1e-3  # step [rad]
+LAST_STEP = 1e-28  # last step, squared, in radii and in the lengths of the segments
+LEAST_STEP = 1e-32  # as far as unit vectors can tell
+SMALL_STEP = 1e-3  # step [rad]
 ROUNDING = 4e-16  # of a height over the surface, in radii
-MOST = 60  # steps; four are normal, bisection alone takes fifty
-SHORT = 1e-4  # the angle of a shorter segment is judged as one of this length: rounding turns it [radii]
+MOST_STEPS = 60  # steps; four are normal, bisection alone takes fifty
+SHORT_SEGMENT = (
+    1e-4  # the angle of a shorter segment is judged as one of this length: rounding turns it [radii]
+)
 
 
 @jit
-def _meets(ax, ay, bx, by):
+def _meets_disc(ax, ay, bx, by):
     """Return whether the straight line from (ax, ay) to (bx, by) meets the unit circle's disc."""
     if ax * ax + ay * ay <= 1.0 or bx * bx + by * by <= 1.0:
         return True
@@ -42,12 +44,13 @@ def _meets(ax, ay, bx, by):
 
 
 @jit
-def _corner(ax, ay, bx, by):
+def _reflection_point(ax, ay, bx, by):
     """Return P on the unit circle (2), |A - P|, |P - B|, the error of the angles [rad] and the number of steps.
 
     The line from A to B misses the disc.
     """
     reach_a, reach_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+    # P as an unnormalised direction; (lx, ly) and (hx, hy) are the bracket's two ends, A and B at equal distance
     way = 1.0 if ax * by - ay * bx >= 0.0 else -1.0
     lx, ly, hx, hy = reach_b * ax, reach_b * ay, reach_a * bx, reach_a * by
     x = (reach_b - 1.0) * ax + (reach_a - 1.0) * bx  # exact where A and B are close in direction
@@ -59,37 +62,40 @@ def _corner(ax, ay, bx, by):
     turn = 1.0
     while True:
         steps += 1
-        if abs(turn) < SMALL:  # |P|^2 is 1 + turn^2: the root's series is exact to rounding
+        if abs(turn) < SMALL_STEP:  # |P|^2 is 1 + turn^2: the root's series is exact to rounding
             over = 1.0 - turn * turn * (0.5 - 0.375 * turn * turn)
         else:
             over = 1.0 / math.sqrt(x * x + y * y)
         x, y = x * over, y * over
+        # components of A - P and B - P along the normal and along the circle
         up_a, up_b = ax * x + ay * y - 1.0, bx * x + by * y - 1.0
         along_a, along_b = way * (ax * y - ay * x), way * (x * by - y * bx)
         square_a, square_b = up_a * up_a + along_a * along_a, up_b * up_b + along_b * along_b
+        # sine and cosine of a - b, times both lengths
         sine, cosine = along_a * up_b - along_b * up_a, up_a * up_b + along_a * along_b
         if sine > 0.0:
             hx, hy = x, y
         else:
             lx, ly = x, y
         noise = reach_b * (abs(along_a) + abs(up_a)) + reach_a * (abs(along_b) + abs(up_b))
-        if abs(sine) <= ROUNDING * noise or steps == MOST:
+        if abs(sine) <= ROUNDING * noise or steps == MOST_STEPS:
             break
         turn = 0.0
         rate_a, rate_b = 0.5 * square_a + least_a, 0.5 * square_b + least_b
         if cosine > abs(sine):
             turn = -sine * square_a * square_b / (cosine * (rate_a * square_b + rate_b * square_a))
-            if turn * turn <= max(ENOUGH * min(square_a, square_b, 1.0), LEAST):
+            if turn * turn <= max(LAST_STEP * min(square_a, square_b, 1.0), LEAST_STEP):
                 break
         elif up_a > 0.0 and up_b > 0.0:
             turn = -sine * up_a * up_b / (rate_a * up_b * up_b + rate_b * up_a * up_a)
+        # Newton's step where it stays within the bracket, else bisection
         nx, ny = x - way * turn * y, y + way * turn * x
         if turn != 0.0 and way * (lx * ny - ly * nx) > 0.0 and way * (nx * hy - ny * hx) > 0.0:
             x, y = nx, ny
         else:
             x, y, turn = lx + hx, ly + hy, 1.0
     size_a, size_b = math.sqrt(square_a), math.sqrt(square_b)
-    error = abs(sine) / (max(size_a, SHORT) * max(size_b, SHORT))
+    error = abs(sine) / (max(size_a, SHORT_SEGMENT) * max(size_b, SHORT_SEGMENT))
     return x, y, size_a, size_b, error, steps
 
 
@@ -104,7 +110,7 @@ def _free(k, ax, ay, az, bx, by, bz, node):
 
 
 @jit
-def _touch(k, px, py, pz, length_a, length_b, ends, node):
+def _write_corner(k, px, py, pz, length_a, length_b, ends, node):
     """Write the corner P, given in world directions from the surface's origin."""
     node[k, lay.S_MODE] = lay.TOUCHED
     for i in range(1, lay.STATE):
@@ -116,11 +122,11 @@ def _touch(k, px, py, pz, length_a, length_b, ends, node):
     node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2] = x, y, z
     least = ON_SURFACE * node[k, lay.SIZE]
     if min(length_a, length_b) <= least:
-        _direct(k, px, py, pz, length_a > least, length_b > least, ends, node)
+        _write_directions(k, px, py, pz, length_a > least, length_b > least, ends, node)
 
 
 @jit
-def _direct(k, px, py, pz, known_a, known_b, ends, node):
+def _write_directions(k, px, py, pz, known_a, known_b, ends, node):
     """Write the directions of both segments where one has no length: that which it has in the limit."""
     nx, ny, nz = normal(k, px, py, pz, node)
     x, y, z = node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]
@@ -151,17 +157,18 @@ def normal(k, x, y, z, node):
 
 
 @apart
-def hold_inside(k, ends, node, tol):
+def solve_held_inside(k, ends, node, tol):
     """Find the shortest string from A to B that meets obstacle k's solid; return (status, length, error, steps).
 
-    ends as in `jumps.solve_span`. Writes the saved solution and, where there is a corner, what `segments` reads: P = Q
-    and the directions of the segments that meet there.
+    ends as in `large_moves.solve_span`. Writes the saved solution and, where there is a corner, what `segments` reads:
+    P = Q and the directions of the segments that meet there.
     """
     x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
     ax, ay, az = ends[3] - x, ends[4] - y, ends[5] - z
     bx, by, bz = ends[6] - x, ends[7] - y, ends[8] - z
     radius = node[k, lay.DIM]
     over = 1.0 / radius
+    # a sphere: the plane of A, B and the centre, with axes u towards A and w at right angles
     if node[k, lay.INSIDE] == lay.ABOUT_POINT:
         reach = math.sqrt(ax * ax + ay * ay + az * az)
         unit = 1.0 / max(reach, 1e-300)
@@ -169,24 +176,25 @@ def hold_inside(k, ends, node, tol):
         along = bx * ux + by * uy + bz * uz
         wx, wy, wz = bx - along * ux, by - along * uy, bz - along * uz
         across = math.sqrt(wx * wx + wy * wy + wz * wz)
-        if _meets(reach * over, 0.0, along * over, across * over):
+        if _meets_disc(reach * over, 0.0, along * over, across * over):
             return lay.CONVERGED, _free(k, ax, ay, az, bx, by, bz, node), 0.0, 0
-        c, s, near, far, error, steps = _corner(reach * over, 0.0, along * over, across * over)
+        c, s, near, far, error, steps = _reflection_point(reach * over, 0.0, along * over, across * over)
         c, s = radius * c, radius * s / max(across, 1e-300)
         length_a, length_b = radius * near, radius * far
         px, py, pz = c * ux + s * wx, c * uy + s * wy, c * uz + s * wz
-        _touch(k, px, py, pz, length_a, length_b, ends, node)
+        _write_corner(k, px, py, pz, length_a, length_b, ends, node)
         return lay.CONVERGED if error <= tol else lay.NOT_CONVERGED, length_a + length_b, error, steps
+    # a cylinder: its cross-section, and z in proportion to the length there
     rx, ry, rz = turn_into_frame(node, k, ax, ay, az)
     qx, qy, qz = turn_into_frame(node, k, bx, by, bz)
-    if _meets(rx * over, ry * over, qx * over, qy * over):
+    if _meets_disc(rx * over, ry * over, qx * over, qy * over):
         return lay.CONVERGED, _free(k, ax, ay, az, bx, by, bz, node), 0.0, 0
-    c, s, near, far, error, steps = _corner(rx * over, ry * over, qx * over, qy * over)
+    c, s, near, far, error, steps = _reflection_point(rx * over, ry * over, qx * over, qy * over)
     rise = qz - rz
     level = radius * (near + far)
     length = math.sqrt(level * level + rise * rise)
     share = near / (near + far)
     rotate(node, k, W_P, radius * c, radius * s, rz + share * rise)
     px, py, pz = node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]
-    _touch(k, px, py, pz, share * length, (1.0 - share) * length, ends, node)
+    _write_corner(k, px, py, pz, share * length, (1.0 - share) * length, ends, node)
     return lay.CONVERGED if error <= tol else lay.NOT_CONVERGED, length, error, steps

@@ -22,7 +22,7 @@ DIM, HINT = lay.DIM, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
 
 INSIDE = 1.0 - 1e-9  # a point closer to the axis than this share of the radius is inside
-CLEAR = 1e-12  # a wrap that would bend the string by less [rad] counts as not touching
+LEAST_BEND = 1e-12  # a wrap that would bend the string by less [rad] counts as not touching
 
 A_INSIDE = 1
 B_INSIDE = 2
@@ -65,11 +65,12 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
         return principal
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
-    foot = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    cx, cy = ax + foot * dx, ay + foot * dy
+    share = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    cx, cy = ax + share * dx, ay + share * dy
     if cx * cx + cy * cy > radius * radius and cx * hint_x + cy * hint_y >= 0.0:
         return principal
     turn = 1.0 if principal >= 0.0 else -1.0
+    # the middle of the arc, as an angle about the axis: the shorter way round, then the other one
     start, end = math.atan2(ay, ax), math.atan2(by, bx)
     middle = start + 0.5 * (principal + turn * (alpha_a - alpha_b))
     towards = math.cos(middle) * hint_x + math.sin(middle) * hint_y
@@ -78,6 +79,7 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
     away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     if towards >= away:
         return principal
+    # the contact points of the longer way: it is not taken where its straight segments cross
     start -= turn * alpha_a
     end += turn * alpha_b
     px, py = radius * math.cos(start), radius * math.sin(start)
@@ -122,8 +124,9 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
         sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+    # the angle that the string lies on: what it sweeps, less what the straight tangents do
     arc = abs(sweep) - tangents_sweep(root_a, root_b, radius)
-    if arc <= CLEAR:
+    if arc <= LEAST_BEND:
         set_free(node, k, sweep)
         return inside
     turn = 1.0 if sweep >= 0.0 else -1.0
@@ -131,6 +134,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     flat = root_a + radius * arc + root_b  # the whole path, seen along the axis
     slope = (bz - az) / flat
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
+    # unrolled, the path is one straight line: the same slope along all of it
     node[k, S_MODE] = lay.TOUCHED
     node[k, S_SWEEP] = sweep
     node[k, S_P] = radius * nx
@@ -145,7 +149,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
 
 @jit
 def _ellipse_arc(a, b, start, arc):
-    """Return the length of (a cos w, b sin w) from w = start over the angle arc, of either sign."""
+    """Return the length of (a cos w, b sin w) from w = start over the angle arc, of either sign: Gauss' rule."""
     pieces = int(math.ceil(abs(arc)))
     half = 0.5 * arc / max(pieces, 1)
     total = 0.0
@@ -162,6 +166,7 @@ def _ellipse_arc(a, b, start, arc):
 def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     """Wrap a string from A to B over an elliptic cylinder about z; the arc's length to about 1e-10."""
     a, b = node[k, DIM], node[k, DIM + 1]
+    # in the affine image in which the cross-section is the unit circle; tangents stay tangents
     px, py, qx, qy = ax / a, ay / b, bx / a, by / b
     square_a, square_b = px * px + py * py, qx * qx + qy * qy
     limit = INSIDE * INSIDE
@@ -175,7 +180,7 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
             px, py, qx, qy, sweep, math.atan(root_a), math.atan(root_b), hint_x, hint_y, 1.0
         )
     arc = abs(sweep) - tangents_sweep(root_a, root_b, 1.0)
-    if arc <= CLEAR:
+    if arc <= LEAST_BEND:
         set_free(node, k, sweep)
         return inside
     turn = 1.0 if sweep >= 0.0 else -1.0
@@ -183,6 +188,7 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     mx, my = _contact_normal(qx, qy, 1.0, root_b, -turn)
     out = math.hypot(a * nx - ax, b * ny - ay)
     round_it = _ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
+    # lengths seen along the axis are those of the ellipse itself again
     flat = out + round_it + math.hypot(a * mx - bx, b * my - by)
     slope = (bz - az) / flat
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
@@ -235,6 +241,7 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     along_a = max(reach_a, 0.0) / sine if root_a == 0.0 else reach_a / sine
     along_b = max(reach_b, 0.0) / sine if root_b == 0.0 else reach_b / sine
     delta_a, delta_b = math.atan2(root_a, along_a), math.atan2(root_b, along_b)
+    # half a turn or more in the development: the straight line from A to B would pass the apex on the wrong side
     arc = abs(sweep) - alpha_a - alpha_b
     if delta_a + arc * sine + delta_b >= math.pi and abs(sweep) > math.pi:
         if node[k, S_MODE] != lay.COLD and abs(node[k, S_SWEEP]) > math.pi:
@@ -243,7 +250,7 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
         sweep = principal  # a free string that passes beyond the apex, or a hint that asks for what cannot be
         arc = abs(sweep) - alpha_a - alpha_b
     total = delta_a + arc * sine + delta_b
-    if arc <= CLEAR or total >= math.pi:
+    if arc <= LEAST_BEND or total >= math.pi:
         set_free(node, k, sweep)
         return inside
     turn = 1.0 if sweep >= 0.0 else -1.0

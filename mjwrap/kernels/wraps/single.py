@@ -1,11 +1,9 @@
-"""Wraps of one obstacle between two given points: cold starts, touchdown and the test for it.
+"""The wrap of one obstacle between two given points, for cold starts and touchdown.
 
 Closed forms where there are any (`ruled.py`, and the sphere here: its shorter way is the only stable one), a search
-with Newton's
-method elsewhere (`search.py`). Every function takes the points A (before) and B (after) and writes the obstacle's row
-of
-`node`. It returns 0, plus A_INSIDE, plus B_INSIDE where the point lies inside the surface (it is then taken as on it),
-plus SLIPPED.
+with Newton's method elsewhere (`search.py`). Every function takes the points A (before) and B (after) and writes the
+obstacle's row of `node`, FREE where the straight segment from A to B is clear of the surface. It returns 0, plus
+A_INSIDE, plus B_INSIDE where the point lies inside the surface (it is then taken as on it), plus SLIPPED.
 """
 
 from __future__ import annotations
@@ -22,15 +20,15 @@ from mjwrap.kernels.geometry.winding import tangents_sweep
 from mjwrap.kernels.wraps.ruled import (
     A_INSIDE,
     B_INSIDE,
-    CLEAR,
     INSIDE,
+    LEAST_BEND,
     SLIPPED,
     set_free,
     wrap_cone,
     wrap_cylinder,
     wrap_elliptic_cylinder,
 )
-from mjwrap.kernels.wraps.search import wrap_searched
+from mjwrap.kernels.wraps.search import wrap_by_search
 
 KIND, DIM, SIZE, POS, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
@@ -77,13 +75,15 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
     root_a = math.sqrt(max(square_a - square, 0.0))
     root_b = math.sqrt(max(square_b - square, 0.0))
+    # the angle between A and B, less what the straight tangents from both sweep, is what the string lies on
     wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     sweep = math.atan2(math.sqrt(wx * wx + wy * wy + wz * wz), ax * bx + ay * by + az * bz)
     arc = sweep - tangents_sweep(root_a, root_b, radius)
-    if arc <= CLEAR:
+    if arc <= LEAST_BEND:
         set_free(node, k, sweep)
         return inside
     wx, wy, wz = _plane_normal(ax, ay, az, bx, by, bz, k, node)
+    # u towards A, v at right angles to it in the string's plane, on the way to B
     rho = max(math.sqrt(square_a), 1e-300)
     ux, uy, uz = ax / rho, ay / rho, az / rho
     vx, vy, vz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
@@ -111,7 +111,7 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     summed, or 0. search: look for another side where a contact is lost, on surfaces without a closed form.
     """
     if not closed_form(k, node):
-        return wrap_searched(k, (base_x, base_y, base_z, ax, ay, az, bx, by, bz), node, search)
+        return wrap_by_search(k, (base_x, base_y, base_z, ax, ay, az, bx, by, bz), node, search)
     x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z
     px, py, pz = turn_into_frame(node, k, ax - x, ay - y, az - z)
     qx, qy, qz = turn_into_frame(node, k, bx - x, by - y, bz - z)
@@ -133,7 +133,7 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
 
 
 @jit
-def holds(k, node, x, y, z):
-    """Return whether the point (x, y, z) of the world lies inside obstacle k."""
+def contains(k, node, x, y, z):
+    """Return whether obstacle k contains the point (x, y, z) of the world: it lies inside its surface."""
     x, y, z = into_frame(node, k, x, y, z)
     return height(node, k, x, y, z) < (INSIDE - 1.0) * node[k, SIZE]

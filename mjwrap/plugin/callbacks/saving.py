@@ -11,7 +11,7 @@ from __future__ import annotations
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.coupling.muscle_paths import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE
 from mjwrap.kernels.solved import segments as sg
-from mjwrap.kernels.spans.end_inside import has_length
+from mjwrap.kernels.spans.end_inside import has_valid_length
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import reals, word, words
@@ -104,7 +104,7 @@ def load_held(block, state):
         if route[c, R_SURFACES] == 0:
             continue
         at += SAVED * route[c, R_SURFACES]
-        if not has_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
+        if not has_valid_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
             most = route[c, R_HI] - route[c, R_LO] + 1
             fits = 0.0 <= state[at] <= most  # anybody may write to plugin_state
             count[c] = int(state[at]) if fits else 0

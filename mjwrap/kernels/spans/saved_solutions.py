@@ -1,0 +1,45 @@
+"""Saved solutions of a span: kept in scratch columns of their rows, and put back from there."""
+
+from __future__ import annotations
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import jit
+from mjwrap.kernels.geometry.geodesics import geodesic
+
+S_MODE = lay.S_MODE
+
+
+@jit
+def save_solutions(lo, hi, node, column):
+    """Copy the saved solutions of lo..hi to the columns that begin at `column` (W_OLD, W_START or W_BEST)."""
+    for k in range(lo, hi):
+        for i in range(lay.STATE):
+            node[k, column + i] = node[k, S_MODE + i]
+
+
+@jit
+def restore_solutions(lo, hi, ends, node, column):
+    """Put the saved solutions of lo..hi back from the columns that begin at `column`, and evaluate their geodesics."""
+    for k in range(lo, hi):
+        for i in range(lay.STATE):
+            node[k, S_MODE + i] = node[k, column + i]
+        if node[k, S_MODE] == lay.TOUCHED:
+            geodesic(k, node, ends[0], ends[1], ends[2])
+
+
+@jit
+def any_in_mode(lo, hi, node, mode):
+    """Return whether a node of lo..hi is in the given mode: COLD, FREE or TOUCHED."""
+    for k in range(lo, hi):
+        if node[k, S_MODE] == mode:
+            return True
+    return False
+
+
+@jit
+def surface_end(k, hi, node):
+    """Return the row behind the last one of row k's surface, which has two where a string may touch it twice."""
+    k += 1
+    while k < hi and node[k, lay.TOUCH] > 0.0:
+        k += 1
+    return k

@@ -1,0 +1,134 @@
+"""Evaluation of a span: geodesics, the straight segments between them, the path error h and the tangency error.
+
+The tangency error is ||f||, f = [e - t_P, e' - t_Q] for every touched obstacle (18), over the whole span (30). Newton's
+method steps with h and is judged by f, which is not zero on the folded path e = -t.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels.geometry.geodesics import geodesic
+from mjwrap.kernels.tangency.path_error import SHORTEST, path_error_at_P, path_error_at_Q
+
+S_MODE, SIZE, TOUCHED = lay.S_MODE, lay.SIZE, lay.TOUCHED
+W_P, W_Q, W_TP, W_TQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
+W_E, W_L, W_CP, W_CQ, W_LQ, W_EQ = lay.W_E, lay.W_L, lay.W_CP, lay.W_CQ, lay.W_LQ, lay.W_EQ
+W_PIN, W_LAND = lay.W_PIN, lay.W_LAND
+
+ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
+LEAST_HEIGHT = 2e-12  # an end point lower above the surface than this share of the size lies on it
+LANDING_SCALE = (
+    0.01  # Q so far off an end on the surface, in its size, counts like a direction that is off by 1 rad
+)
+CORNER = 1e-6  # half the angle between two contacts that meet, beyond which they do not go on into each other [rad]
+POINT_ROUNDING = 4e-16  # of a point [m]: over a segment's length it bounds what its direction can say
+
+
+@jit
+def evaluate(lo, hi, ends, node):
+    """Evaluate all touched obstacles of nodes lo..hi and the straight segments between; return ||f||^2.
+
+    ends = (base x, y, z, A x, y, z, B x, y, z): A and B relative to the base point [m].
+    """
+    for k in range(lo, hi):
+        if node[k, S_MODE] == TOUCHED:
+            geodesic(k, node, ends[0], ends[1], ends[2])
+    return connect_segments(lo, hi, ends, node)
+
+
+@jit
+def connect_segments(lo, hi, ends, node):
+    """Put straight segments between the geodesics that the rows hold; write e, e' and h, and return ||f||^2.
+
+    Where an end point lies on a surface there is no straight segment whose direction could differ from t.
+    """
+    _, _, _, x, y, z, bx, by, bz = ends
+    total = 0.0
+    last = -1
+    for k in range(lo, hi):
+        if node[k, S_MODE] != TOUCHED:
+            continue
+        # the segment from (x, y, z), which is A or Q of the obstacle before, to P
+        dx, dy, dz = node[k, W_P] - x, node[k, W_P + 1] - y, node[k, W_P + 2] - z
+        size = math.sqrt(dx * dx + dy * dy + dz * dz)
+        meets = last >= 0 and size <= ON_SURFACE * node[k, SIZE]
+        if meets:
+            # two contacts meet: e is the mean of both tangents, and where these differ there is a corner
+            dx, dy, dz = (
+                node[last, W_TQ] + node[k, W_TP],
+                node[last, W_TQ + 1] + node[k, W_TP + 1],
+                node[last, W_TQ + 2] + node[k, W_TP + 2],
+            )
+            inverse = 1.0 / (math.sqrt(dx * dx + dy * dy + dz * dz) + SHORTEST)
+        else:
+            inverse = 1.0 / (size + SHORTEST)
+        dx, dy, dz = dx * inverse, dy * inverse, dz * inverse
+        node[k, W_E] = dx
+        node[k, W_E + 1] = dy
+        node[k, W_E + 2] = dz
+        node[k, W_L] = size
+        along, normal, binormal = path_error_at_P(k, node)
+        if last < 0 and ends_on_surface(k, -normal, size, node):
+            along, normal, binormal = 1.0, 0.0, 0.0
+        node[k, W_CP] = along
+        node[k, W_CP + 1] = normal
+        node[k, W_CP + 2] = binormal
+        corner = meets and (1.0 - along) ** 2 + normal * normal + binormal * binormal > CORNER**2
+        # a corner counts in full, however short the segment at it is
+        total += _error_share(along, normal, binormal, 1.0 if corner else size)
+        if last >= 0:
+            total += _enter_leaving_segment(last, dx, dy, dz, size, False, node)
+        x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
+        last = k
+    if last >= 0:
+        dx, dy, dz = bx - x, by - y, bz - z
+        size = math.sqrt(dx * dx + dy * dy + dz * dz)
+        inverse = 1.0 / (size + SHORTEST)
+        total += _enter_leaving_segment(last, dx * inverse, dy * inverse, dz * inverse, size, True, node)
+    return total
+
+
+@jit
+def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
+    """Write the straight segment that leaves obstacle j, the path's last one or not; return its share of ||f||^2.
+
+    Where the path ends on the surface its share is that of the way from Q to its end.
+    """
+    node[j, W_EQ] = ex
+    node[j, W_EQ + 1] = ey
+    node[j, W_EQ + 2] = ez
+    node[j, W_LQ] = size
+    node[j, W_PIN] = 0.0
+    along, normal, binormal = path_error_at_Q(j, node)
+    if last and (node[j, W_LAND] != 0.0 or ends_on_surface(j, normal, size, node)):
+        # rows 2 and 3 of h become the components of Q - B along t_Q and b_Q: a vanishing segment has no direction
+        node[j, W_PIN] = 1.0
+        node[j, W_CQ] = 0.0
+        node[j, W_CQ + 1] = -size * along
+        node[j, W_CQ + 2] = -size * binormal
+        share = size / (LANDING_SCALE * node[j, SIZE])
+        return share * share * (along * along + binormal * binormal)
+    node[j, W_CQ] = along
+    node[j, W_CQ + 1] = normal
+    node[j, W_CQ + 2] = binormal
+    return _error_share(along, normal, binormal, size)
+
+
+@inlined
+def ends_on_surface(k, rise, size, node):
+    """Return whether a straight segment, `size` long, is none because the path ends there on obstacle k's surface.
+
+    rise: the component along the surface's normal of the direction from the contact to the end; negative where the end
+    lies below, by no more than the share of the size from which on it counts as inside.
+    """
+    return size <= ON_SURFACE * node[k, SIZE] and size * rise <= LEAST_HEIGHT * node[k, SIZE]
+
+
+@inlined
+def _error_share(along, normal, binormal, size):
+    """Return one end's share |e - t|^2 of ||f||^2 (18); nothing where a short segment's direction is noise."""
+    share = (1.0 - along) ** 2 + normal * normal + binormal * binormal
+    return share if share * size * size > POINT_ROUNDING * POINT_ROUNDING else 0.0
