@@ -352,11 +352,13 @@ def test_an_elastic_tendon_is_judged_as_a_rigid_one(
 
 @pytest.mark.myo
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # myo_sim builds it so
 def test_the_full_body_has_160_negative_tendons() -> None:
     """Counted from the model's own arrays, the 44 muscles that stay with MuJoCo included."""
     myo_sim = pytest.importorskip("myo_sim")
-    with pytest.warns(UserWarning, match="empty prefix"):
-        model = myo_sim.load_model("myofullbody")
+    model = myo_sim.load_model("myofullbody")
     low, high = model.actuator_lengthrange.T
     first, last = model.actuator_gainprm[:, :2].T
     negative = np.flatnonzero(low - first * (high - low) / (last - first) < 0.0)
@@ -368,11 +370,13 @@ def test_the_full_body_has_160_negative_tendons() -> None:
 
 @pytest.mark.myo
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # myo_sim builds it so
 def test_random_poses_of_the_arm_stay_within_its_ranges() -> None:
     """Up to eight variables move a muscle: thousands of poses drawn at random get less far than the search."""
     myo_sim = pytest.importorskip("myo_sim")
-    with pytest.warns(UserWarning, match="empty prefix"):
-        model = myo_sim.load_model("myoarm_r")
+    model = myo_sim.load_model("myoarm_r")
     muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
     found = mw.length_ranges(muscles)
     assert mw.length_ranges(muscles, names=["BRA"])["BRA"].held == ()

@@ -15,7 +15,7 @@ import test_path_failures
 from declared_models import ARM, EXTENSOR, HILL, HOLDER, MUSCLE, ROW, declared, element
 from mujoco import rollout
 from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, native_spec, start
-from newer_mujoco import WAYS, batch
+from newer_mujoco import WAYS, batch, needs_kept_states
 
 import mjwrap as mw
 from mjwrap.errors import ModelError
@@ -277,7 +277,7 @@ def test_models_of_equal_shape_do_not_mix() -> None:
 
 
 def test_a_saved_model_runs_as_before(tmp_path: Path) -> None:
-    """As XML, as MJB, and compiled again from the spec with its state."""
+    """As XML, as MJB, and compiled again from the spec."""
     spec = spec_of(SCENES["elbow"])
     model = install(spec)
     reference = moving(model)
@@ -289,6 +289,14 @@ def test_a_saved_model_runs_as_before(tmp_path: Path) -> None:
         data = moving(other)
         mujoco.mj_step(other, data, nstep=60)
         np.testing.assert_allclose(data.qpos, reference.qpos, rtol=0.0, atol=tolerance)  # XML has six digits
+
+
+@needs_kept_states
+def test_a_model_compiled_again_keeps_its_state() -> None:
+    spec = spec_of(SCENES["elbow"])
+    model = install(spec)
+    reference = moving(model)
+    mujoco.mj_step(model, reference, nstep=60)
     model, data = spec.recompile(model, reference)
     np.testing.assert_array_equal(data.plugin_state, reference.plugin_state)
 

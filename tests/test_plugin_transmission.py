@@ -10,7 +10,7 @@ import pytest
 from cable_robot import CABLES, drive
 from declared_models import ARM, EXTENSOR, HILL, MUSCLE, PULLEYS, ROW, declared, element, tendon_jacobian
 from native_twins import ELBOW, INTEGRATORS, excite, native_spec, start
-from newer_mujoco import WAYS
+from newer_mujoco import WAYS, needs_felt_tendons
 from test_path_failures import RADIUS, SCENE
 from test_plugin import STATE, check_bits, moving, spec_of, state_of
 
@@ -312,6 +312,7 @@ def test_tendons_show_the_path_unless_mujoco_itself_uses_them() -> None:
     assert len(set(lengths)) == 1
 
 
+@needs_felt_tendons
 def test_sensors_of_force_keep_the_tendons() -> None:
     """MuJoCo lets them feel its actuators along its own tendons, which are right here."""
     datas = []
