@@ -143,7 +143,7 @@ def test_the_plugin_moves_the_model_as_mujoco_does(
     route: str, actuator: str, integrator: int, mode: str
 ) -> None:
     if VERSION < (3, 16) and integrator == EXPLICIT[1] and (route, actuator) in LOSES_THE_CORNER:
-        pytest.skip("before MuJoCo 3.16 its tendon goes straight through a geom at 3 poses in 1,000")
+        pytest.skip("before MuJoCo 3.16 its tendon takes a wrong corner inside a geom at 3 poses in 1,000")
     native = mujoco.MjModel.from_xml_string(xml(route, actuator))
     ours = install(mujoco.MjSpec.from_string(xml(route, actuator)), mode)
     data, twin = mujoco.MjData(ours), mujoco.MjData(native)
