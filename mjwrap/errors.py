@@ -51,4 +51,7 @@ class RecordingError(MjwrapError, OSError):
 
 
 class VersionError(MjwrapError, RuntimeError):
-    """The installed MuJoCo is not one that the engine plugin can verify; `MuscleSystem` works without the plugin."""
+    """The installed MuJoCo is too old, or is not one that the engine plugin can verify.
+
+    In the second case `MuscleSystem` works without the plugin.
+    """

@@ -353,6 +353,9 @@ def test_an_elastic_tendon_is_judged_as_a_rigid_one(
 
 @pytest.mark.myo
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # myo_sim builds it so
 def test_the_full_body_has_160_negative_tendons() -> None:
     """Counted from the model's own arrays, the 44 muscles that stay with MuJoCo included."""
     model = load_myo("myofullbody")
@@ -367,6 +370,9 @@ def test_the_full_body_has_160_negative_tendons() -> None:
 
 @pytest.mark.myo
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # myo_sim builds it so
 def test_random_poses_of_the_arm_stay_within_its_ranges() -> None:
     """Up to eight variables move a muscle: thousands of poses drawn at random get less far than the search."""
     model = load_myo("myoarm_r")

@@ -378,6 +378,9 @@ def test_the_elbow_of_myo_sim_agrees() -> None:
 
 @pytest.mark.myo
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # myo_sim builds it so
 def test_the_jumps_of_the_arm_of_myo_sim_are_mujocos() -> None:
     """Along smooth sweeps the latissimus goes over to the other side of a cylinder; mjwrap's path does not jump."""
     model = load_myo("myoarm_r")

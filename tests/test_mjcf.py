@@ -155,7 +155,7 @@ def test_a_muscle_without_a_path_at_most_poses_stays_native(share: float, stays:
 
 
 FIXED = EXTENSOR + '<fixed name="sum"><joint joint="elbow" coef="1"/></fixed>'
-LIMITED = EXTENSOR.replace('"extensor"', '"extensor" actuatorfrcrange="-50 50"')
+LIMITED = EXTENSOR.replace('"extensor"', '"extensor" actuatorfrclimited="true" actuatorfrcrange="-50 50"')
 CURVES = 'gainprm="0.75 1.05 100 200 0.5 1.6 1.5 1.3 1.2" lengthrange="0.3 0.6"'
 STAYS_NATIVE = {
     "joint": (EXTENSOR, '<muscle name="m" joint="elbow" lengthrange="-1 1"/>', "does not pull a tendon"),

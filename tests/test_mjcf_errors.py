@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import mujoco
 import pytest
@@ -32,6 +34,12 @@ def message(model: mujoco.MjModel) -> str:
         mw.MuscleSystem(model)
     assert (model.actuator_forcelimited == limited).all()
     return str(caught.value)
+
+
+def test_a_mujoco_that_is_too_old_is_told_apart_from_a_bad_model() -> None:
+    old: Any = SimpleNamespace()  # a model of MuJoCo 3.10 counts no actuators apart from their controls
+    with pytest.raises(mw.VersionError, match=r"needs MuJoCo 3\.11 or newer, this is"):
+        read_declarations(old)
 
 
 def tuple_message(*elements: str, values: dict[str, float] | None = None, law: str | None = None) -> str:

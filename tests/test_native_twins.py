@@ -13,6 +13,7 @@ from declared_models import ARM, EXTENSOR, MUSCLE, tendon_jacobian
 from mjcf_reading import Vector
 from myo_models import load_myo
 from native_twins import EXPLICIT
+from newer_mujoco import VERSION
 
 import mjwrap as mw
 from mjwrap.mjcf import read_declarations
@@ -51,6 +52,8 @@ ACTUATORS = {
     "early smooth muscle": f'{FLV} {SAME} dyntype="muscle" dynprm="0.01 0.04 0.2" actearly="true"/>',
     "early without a state": f'{FLV} {SAME} ctrlrange="0 1" actearly="true"/>',
 }
+WRONG_CORNER = "before MuJoCo 3.16 its tendon takes a wrong corner inside a geom at 3 poses in 1,000"
+LOSES_THE_CORNER = [("inside both", "plain"), ("pulleys", "plain")]  # at a stage of RK4
 CASES = [(route, "plain") for route in ROUTES] + [("outside", actuator) for actuator in ACTUATORS]
 
 
@@ -141,6 +144,8 @@ def test_the_jacobian_of_a_held_string_changes_as_its_rate_says() -> None:
 def test_the_plugin_moves_the_model_as_mujoco_does(
     route: str, actuator: str, integrator: int, mode: str
 ) -> None:
+    if VERSION < (3, 16) and integrator == EXPLICIT[1] and (route, actuator) in LOSES_THE_CORNER:
+        pytest.skip(WRONG_CORNER)
     native = mujoco.MjModel.from_xml_string(xml(route, actuator))
     ours = install(mujoco.MjSpec.from_string(xml(route, actuator)), mode)
     data, twin = mujoco.MjData(ours), mujoco.MjData(native)
@@ -161,6 +166,9 @@ def test_the_plugin_moves_the_model_as_mujoco_does(
 
 @pytest.mark.myo
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore:Attaching a spec with an empty prefix:UserWarning"
+)  # myo_sim builds it so
 def test_the_arm_of_myo_sim_is_taken_over() -> None:
     """All muscles but one, whose end is inside its cylinder at most poses; held ones agree with MuJoCo's."""
     model, native = (load_myo("myoarm_r") for _ in range(2))
@@ -172,6 +180,8 @@ def test_the_arm_of_myo_sim_is_taken_over() -> None:
         if any(node.inside for route in muscle.routes for node in route.nodes)
     ]
     assert len(held) == 20
+    if VERSION < (3, 16):
+        pytest.skip(WRONG_CORNER)
     tendons = [muscles.declarations[i].tendon for i in held]
     low, high = model.jnt_range.T
     rng = np.random.default_rng(73)

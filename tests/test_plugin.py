@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 import test_path_failures
 from declared_models import ARM, EXTENSOR, HILL, HOLDER, MUSCLE, ROW, declared, element
-from mujoco import batch, rollout
+from mujoco import rollout
 from native_twins import ELBOW, EXPLICIT, INTEGRATORS, PUSH, excite, native_model, native_spec, start
+from newer_mujoco import WAYS, batch, needs_kept_states
 
 import mjwrap as mw
 from mjwrap.errors import ModelError
@@ -152,13 +153,14 @@ def test_runge_kutta_keeps_its_fourth_order() -> None:
 # -------------------------------------------------------------------------------------------- who steps it
 
 
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("scene", SCENES)
-def test_the_bits_do_not_depend_on_who_steps(scene: str) -> None:
-    check_bits(install(spec_of(SCENES[scene])))
+def test_the_bits_do_not_depend_on_who_steps(scene: str, way: str) -> None:
+    check_bits(install(spec_of(SCENES[scene])), way)
 
 
-def check_bits(model: mujoco.MjModel) -> None:
-    """A loop, rollout and batch on one and two threads, environments in any order: all states are the same."""
+def check_bits(model: mujoco.MjModel, way: str) -> None:
+    """A loop and rollout or batch on one and two threads, environments in any order: all states are the same."""
     nenv, nstep = 6, 120
     initial = np.stack([state_of(moving(model, seed)) for seed in range(nenv)])
     control = np.random.default_rng(1).uniform(0.0, 1.0, (nenv, nstep, model.nu))
@@ -169,6 +171,9 @@ def check_bits(model: mujoco.MjModel) -> None:
             data.ctrl[:] = control[env, k]
             mujoco.mj_step(model, data)
             expected[env, k] = state_of(data)
+    if way == "batch":
+        check_batch(model, control, expected)
+        return
     used = mujoco.MjData(model)
     mujoco.mj_step(model, used, nstep=7)
     mujoco.mj_forward(model, used)
@@ -176,6 +181,10 @@ def check_bits(model: mujoco.MjModel) -> None:
         for order in (np.arange(nenv), np.arange(nenv)[::-1]):
             found, _ = rollout.rollout(model, datas, initial[order], control[order])
             np.testing.assert_array_equal(found[np.argsort(order)], expected)
+
+
+def check_batch(model: mujoco.MjModel, control: np.ndarray, expected: np.ndarray) -> None:
+    nenv, nstep, _ = control.shape
     starts = [moving(model, env) for env in range(nenv)]
     for threads in (1, 2):
         pool = batch.Batch(model, nenv, nthread=threads)
@@ -268,7 +277,7 @@ def test_models_of_equal_shape_do_not_mix() -> None:
 
 
 def test_a_saved_model_runs_as_before(tmp_path: Path) -> None:
-    """As XML, as MJB, and compiled again from the spec with its state."""
+    """As XML, as MJB, and compiled again from the spec."""
     spec = spec_of(SCENES["elbow"])
     model = install(spec)
     reference = moving(model)
@@ -280,6 +289,14 @@ def test_a_saved_model_runs_as_before(tmp_path: Path) -> None:
         data = moving(other)
         mujoco.mj_step(other, data, nstep=60)
         np.testing.assert_allclose(data.qpos, reference.qpos, rtol=0.0, atol=tolerance)  # XML has six digits
+
+
+@needs_kept_states
+def test_a_model_compiled_again_keeps_its_state() -> None:
+    spec = spec_of(SCENES["elbow"])
+    model = install(spec)
+    reference = moving(model)
+    mujoco.mj_step(model, reference, nstep=60)
     model, data = spec.recompile(model, reference)
     np.testing.assert_array_equal(data.plugin_state, reference.plugin_state)
 

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from native_twins import INTEGRATORS, PUSH, excite
+from newer_mujoco import needs_kept_states
 from test_plugin import SCENES, moving, spec_of, state_of
 
 from mjwrap.plugin import excitations, install, read
@@ -90,6 +91,7 @@ def test_inverse_dynamics_see_the_muscles_once() -> None:
         np.testing.assert_allclose(data.qfrc_inverse, given, rtol=0.0, atol=1e-12 * np.abs(given).max())
 
 
+@needs_kept_states
 def test_a_run_goes_on_after_the_spec_is_compiled_again() -> None:
     spec = spec_of(SCENES["elastic arm"])
     model = install(spec, keep_tendons=True)  # as the spec compiles

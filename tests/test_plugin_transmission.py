@@ -10,6 +10,7 @@ import pytest
 from cable_robot import CABLES, drive
 from declared_models import ARM, EXTENSOR, HILL, MUSCLE, PULLEYS, ROW, declared, element, tendon_jacobian
 from native_twins import ELBOW, INTEGRATORS, excite, native_spec, start
+from newer_mujoco import WAYS, needs_felt_tendons
 from test_path_failures import RADIUS, SCENE
 from test_plugin import STATE, check_bits, moving, spec_of, state_of
 
@@ -152,9 +153,10 @@ def test_by_wrenches_muscles_lack_only_the_implicit_damping(integrator: str) -> 
 # ---------------------------------------------------------------------------------- who steps, and state
 
 
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("xml", [CABLES, LOST], ids=["cables", "lost paths"])
-def test_the_bits_do_not_depend_on_who_steps(xml: str) -> None:
-    check_bits(install(spec_of(xml), mode="transmission"))
+def test_the_bits_do_not_depend_on_who_steps(xml: str, way: str) -> None:
+    check_bits(install(spec_of(xml), mode="transmission"), way)
 
 
 @pytest.mark.parametrize("integrator", [0, RK4])
@@ -310,6 +312,7 @@ def test_tendons_show_the_path_unless_mujoco_itself_uses_them() -> None:
     assert len(set(lengths)) == 1
 
 
+@needs_felt_tendons
 def test_sensors_of_force_keep_the_tendons() -> None:
     """MuJoCo lets them feel its actuators along its own tendons, which are right here."""
     datas = []

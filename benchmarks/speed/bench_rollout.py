@@ -20,9 +20,15 @@ from typing import Any
 import mujoco
 import numpy as np
 from installed_models import HOME, MODELS, MODES, Array, compiled, excitations
-from mujoco import batch, rollout
+from mujoco import rollout
 
 import mjwrap as mw
+
+batch: Any
+try:
+    from mujoco import batch
+except ImportError:  # before MuJoCo 3.17
+    batch = None
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 LOOK = 20  # steps between two controls
@@ -107,7 +113,8 @@ def main() -> int:
         "--models", nargs="+", choices=known, default=list(MODELS), metavar="MODEL", help=", ".join(known)
     )
     parser.add_argument("--mode", choices=MODES, default=MODES[0])
-    parser.add_argument("--ways", nargs="+", choices=("rollout", "batch"), default=["rollout", "batch"])
+    ways = ["rollout", "batch"] if batch is not None else ["rollout"]
+    parser.add_argument("--ways", nargs="+", choices=ways, default=ways)
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
     parser.add_argument("--envs", type=int, default=4, help="environments (default 4)")
     parser.add_argument("--steps", type=int, default=250, help="steps of each (default 250)")

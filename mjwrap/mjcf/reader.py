@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 
-from mjwrap.errors import ModelError
+from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, path_reason, pulled_tendon
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
 from mjwrap.mjcf.inside import shares_inside
@@ -24,6 +24,8 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
     muscle actuators that mjwrap cannot take over, or other actuators whose path it cannot, are left to MuJoCo and
     named in `native`.
     """
+    if not hasattr(model, "nactuator"):
+        raise VersionError(f"mjwrap needs MuJoCo 3.11 or newer, this is {mujoco.__version__}")
     rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
     by_actuator, free = _read_tuples(model, rest, transmission)
