@@ -178,7 +178,7 @@ def test_normal_turns_with_the_shape_operator(surface: CustomSurface) -> None:
 
 
 def test_jacobi_fields_match_neighbouring_geodesics(surface: CustomSurface) -> None:
-    """Q and t_Q as docs/derivation.md has them: shift along b carries a, turning about n carries r."""
+    """Columns of method section 2 for Q and t_Q: shift along b carries a, turning about n carries r."""
     rng = np.random.default_rng(8)
     for _ in range(CASES):
         node = random_rows(surface, 1, rng)

@@ -148,7 +148,7 @@ def test_normal_turns_with_the_shape_operator(kind: Callable[[np.random.Generato
 
 
 def test_jacobi_fields_match_neighbouring_geodesics(kind: Callable[[np.random.Generator], Surface]) -> None:
-    """Q and b_Q as docs/derivation.md has them: shift along b carries a, turning about n carries r."""
+    """Columns of method section 2 for Q and b_Q: shift along b carries a, turning about n carries r."""
     rng = np.random.default_rng(4)
     for _ in range(CASES):
         node = row(kind, rng)

@@ -3,7 +3,7 @@
 Each motion moves and turns all surfaces and both end points through one period in 1,501 poses, each solved from
 the one before. It fails where length or moment arm jumps though the path goes on behind the jump (polished
 there by other means, and judged), where the speed is not the rate of the length, where it depends on the way
-(backwards, every 10th or 50th pose, one compiled loop) and where the judge of `certificate.py` refutes a
+(backwards, every 10th or 50th pose, one compiled loop) and where the judge of `tests/certificate.py` refutes a
 pose. A string that slips because its path ceases to be a minimum is counted apart. Surfaces pulled through a
 string in one or two steps are compared with the same in fine ones. The exit status is 1 for any failure.
 """

@@ -2,7 +2,7 @@
 
 Scenes at muscle scale of every surface alone and of rows of 3, 5, 16 and 64 (`random_scenes.py`), each solved
 with good hints, with random ones and with none. Every converged answer is judged again, from its contact points
-alone, by `certificate.py`. Answers without hints are compared with every other path known for the scene:
+alone, by `tests/certificate.py`. Answers without hints are compared with every other path known for the scene:
 the one that it was made for, the certified answers with hints, and, for the first --multistart scenes of a
 class, the shortest that an independent search finds (`multistart.py`). Whatever does not converge, is refuted
 or is longer can be saved and replayed. The exit status is 1 if a claim is refuted.

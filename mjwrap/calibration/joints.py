@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf import MuscleDeclaration, name_of, names
-from mjwrap.model.crossing import crossed_dofs
 from mjwrap.poses.joint_sweeps import Coupling, read_couplings
 
 Array = NDArray[np.float64]
@@ -122,7 +121,7 @@ class JointSpace:
 
     def moves(self, muscles: list[MuscleDeclaration]) -> tuple[Bools, list[tuple[str, ...]]]:
         """Return which variables move which muscle (n, k), and the names of the held joints that do."""
-        joints = crossed_dofs(self.model, muscles)[:, self.model.jnt_dofadr]
+        joints = _joints_between(self.model, muscles)
         variables = np.zeros((len(muscles), self.k), dtype=np.bool_)
         held: list[tuple[str, ...]] = []
         for i, row in enumerate(joints):
@@ -218,6 +217,23 @@ def _spans(
             wanted = "0 and a largest angle up to π" if ball else "finite and not decreasing"
             raise ModelError(f"range of joint '{known[joint]}' must be {wanted}, not {low:g} to {high:g}")
     return spans
+
+
+def _joints_between(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Bools:
+    """Return which joints (n, njnt) move a muscle: they have some, not all, of a route's stops above them."""
+    above = np.zeros((model.nbody, model.njnt), dtype=np.bool_)
+    for body in range(1, model.nbody):
+        above[body] = above[model.body_parentid[body]]
+        first = int(model.body_jntadr[body])
+        above[body, first : first + int(model.body_jntnum[body])] = True
+    found = np.zeros((len(muscles), model.njnt), dtype=np.bool_)
+    for i, muscle in enumerate(muscles):
+        for route in muscle.routes:
+            sites = [route.origin, route.insertion, *(n.site for n in route.nodes if n.geom < 0)]
+            geoms = [n.geom for n in route.nodes if n.geom >= 0]
+            stops = above[[*model.site_bodyid[sites], *model.geom_bodyid[geoms]]]
+            found[i] |= stops.any(axis=0) & ~stops.all(axis=0)
+    return found
 
 
 def _right_jacobian(turn: Array) -> Array:

@@ -141,7 +141,7 @@ class PathSolution(Derivatives):
         """Return what the path under `tension` [N] does to origin, each obstacle and insertion.
 
         (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
-        is -tension l̇ (docs/derivation.md, velocity and force).
+        is -tension l̇ (method section 5).
         """
         if not np.isfinite(tension):
             raise GeometryError(f"tension must be finite [N], not {tension!r}")

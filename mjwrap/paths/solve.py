@@ -50,8 +50,9 @@ def solve_path(
 
     origin, insertion (3,): world [m]; obstacles: in the order in which the path meets them, each touched or not; start:
     an earlier solution for the same obstacles elsewhere, or its `branch`: side and winding are kept; tol: largest
-    tangency error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`),
-    which ignore hints and may find a path that winds further than a string would.
+    tangency
+    error. method: "newton", or the paper's "nr", "bfgs", "broyden" with their own options (`mjwrap.methods`), which
+    ignore hints and may find a path that winds further than a string would.
     Raises `GeometryError` for input that describes no scene; a path that cannot be found is a status of the result.
     """
     tol = validation.positive(tol, "tol", GeometryError)

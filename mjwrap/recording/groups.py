@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from mjwrap.errors import RecordingError
-from mjwrap.model.crossing import crossed_by_route, moved_bodies
 
 MOST, LEAST = 12, 4  # groups that are made where none are given, and muscles in each but the last
 OTHERS = "others"
@@ -113,12 +112,16 @@ def crossed_coordinates(
     model: Any, declarations: Sequence[Any], joint_names: Sequence[str]
 ) -> list[Coordinate]:
     """Every coordinate that some muscle crosses: that moves some of the bodies on its route and not all."""
-    moves = moved_bodies(model)
+    moves = np.zeros((model.nbody, model.nv), dtype=np.bool_)
+    for body in range(1, model.nbody):
+        moves[body] = moves[model.body_parentid[body]]
+        first = int(model.body_dofadr[body])
+        moves[body, first : first + int(model.body_dofnum[body])] = True
     crossing = np.zeros((len(declarations), model.nv), dtype=np.bool_)
     for i, muscle in enumerate(declarations):
         sites = [muscle.origin_site, muscle.insertion_site, *muscle.via_sites]
         bodies = [*model.site_bodyid[sites], *model.geom_bodyid[muscle.geoms]]
-        crossing[i] = crossed_by_route(moves, bodies)
+        crossing[i] = moves[bodies].any(axis=0) & ~moves[bodies].all(axis=0)
     followers = {
         int(model.eq_obj1id[i])
         for i in range(model.neq)

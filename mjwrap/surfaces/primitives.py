@@ -179,8 +179,9 @@ class Cone(Surface):
     """A circular cone about local z, or a tapered cylinder.
 
     bottom_radius, top_radius [m]: at z = -half_length and z = half_length, not negative and not equal (the slope at
-    least 1e-3: use `Cylinder` instead); half_length [m], finite and positive: a range of validity, as of `Cylinder`,
-    that never reaches beyond the apex. `GeometryError` for other sizes.
+    least
+    1e-3: use `Cylinder` instead); half_length [m], finite and positive: a range of validity, as of `Cylinder`, that
+    never reaches beyond the apex. `GeometryError` for other sizes.
     """
 
     bottom_radius: float

@@ -3,7 +3,7 @@
 One surface: every path (`multistart_single`), and for a torus also those that bridge its hole. Up to FEW
 surfaces: strings laid round them in many ways (`multistart_rows`). Longer rows: in addition every window of
 WINDOW neighbours of a given path is searched anew between fixed ends; where a shorter way through it exists,
-the whole path is polished from there. A path counts only if the judge of `certificate.py` has nothing
+the whole path is polished from there. A path counts only if the judge of `tests/certificate.py` has nothing
 against it.
 """
 

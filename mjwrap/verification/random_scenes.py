@@ -2,7 +2,7 @@
 
 Half of them are made backwards: a geodesic that a string can lie on is drawn first, on every surface in turn,
 and the ends are put on its tangents. So one taut path is known in advance, its middle is a good hint, and its
-length bounds the shortest. The other half are placed at random (`scenes.py`), as obstacles happen to lie,
+length bounds the shortest. The other half are placed at random (`tests/scenes.py`), as obstacles happen to lie,
 and have no good hint.
 """
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
 from mjwrap.cli.common.output import open_output
+from mjwrap.cli.run.samples import spanned
 from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import dof_names
-from mjwrap.model.crossing import crossed_dofs
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Analysis:
         self._parts: list[_Part] = []
         names, dofs = muscles.names, dof_names(model)
         fibers = [i for i, m in enumerate(muscles.declarations) if hasattr(m.parameters, "tendon")]
-        moved = np.flatnonzero(crossed_dofs(model, muscles.declarations).any(axis=0)).tolist()
+        moved = sorted({d for muscle in muscles.declarations for d in spanned(model, muscle)})
         self._add(prefix, "Length", names, lambda _: muscles.length)
         if fibers:
             with_fibers = [names[i] for i in fibers]

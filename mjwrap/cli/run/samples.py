@@ -14,8 +14,7 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.writing import save_npz
-from mjwrap.mjcf import act_names, dof_names, qpos_names
-from mjwrap.model.crossing import crossed_dofs
+from mjwrap.mjcf import MuscleDeclaration, act_names, dof_names, qpos_names
 from mjwrap.runs.excitation import control_names
 
 Array = NDArray[np.float64]
@@ -59,11 +58,36 @@ def _reader(owner: MuscleSystem | None, kind: str) -> Callable[[mujoco.MjData], 
 
 
 def _moment_arms(model: mujoco.MjModel, muscles: MuscleSystem) -> Column:
-    """Return the moment arms of every muscle about the joints that it crosses."""
+    """Return the moment arms of every muscle about the joints that it spans."""
     dofs = dof_names(model)
-    rows, places = np.nonzero(crossed_dofs(model, muscles.declarations))
-    names = [f"moment_arm:{muscles.names[i]}:{dofs[d]}" for i, d in zip(rows, places, strict=True)]
+    pairs = [(i, d) for i, muscle in enumerate(muscles.declarations) for d in spanned(model, muscle)]
+    rows, places = (
+        np.array(part, dtype=np.int64) for part in (zip(*pairs, strict=True) if pairs else ((), ()))
+    )
+    names = [f"moment_arm:{muscles.names[i]}:{dofs[d]}" for i, d in pairs]
     return Column(names, lambda data: -muscles.length_jacobian(data)[rows, places])
+
+
+def spanned(model: mujoco.MjModel, muscle: MuscleDeclaration) -> list[int]:
+    """Return the dofs that move some, but not all, of the bodies that one of a muscle's routes runs over."""
+    found: set[int] = set()
+    for route in muscle.routes:
+        sites = [route.origin, route.insertion, *(node.site for node in route.nodes if node.site >= 0)]
+        bodies = [int(model.site_bodyid[s]) for s in sites]
+        bodies += [int(model.geom_bodyid[node.geom]) for node in route.nodes if node.geom >= 0]
+        chains = [_chain(model, body) for body in bodies]
+        found |= set.union(*chains) - set.intersection(*chains)
+    return sorted(found)
+
+
+def _chain(model: mujoco.MjModel, body: int) -> set[int]:
+    """Return the dofs that move a body."""
+    found: set[int] = set()
+    while body > 0:
+        first = int(model.body_dofadr[body])
+        found |= set(range(first, first + int(model.body_dofnum[body])))
+        body = int(model.body_parentid[body])
+    return found
 
 
 class Samples:

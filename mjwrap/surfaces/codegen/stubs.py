@@ -50,5 +50,5 @@ geodesic_entry = project_entry = height_entry = inner
 
 
 def step(*state: Any) -> tuple[float, ...]:
-    """Return the state after one extrapolated step; see `extrapolation.py`."""
+    """Return the state after one Runge-Kutta step; see `runge_kutta.py`."""
     raise NotImplementedError
