@@ -52,7 +52,7 @@ def residual(node: Array, ends: tuple[float, ...]) -> Array:
     return work[touched(work)][:, columns].ravel()
 
 
-def touched(node: Array) -> Array:
+def touched(node: Array) -> NDArray[np.intp]:
     """Return which rows are touched; the second row of a torus is not, where no hollow is bridged."""
     return np.flatnonzero(node[:, lay.S_MODE] == lay.TOUCHED)
 
