@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels._jit import apart, inlined, jit
 from mjwrap.kernels.geometry.traits import closed_form, one_sided
 from mjwrap.kernels.spans.active_set import (
     MERGE_DISTANCE,
@@ -86,10 +86,11 @@ def solve_active_set(lo, hi, ends, node, tol, direct):
     return status, path_length(lo, hi, ends, node), error, iterations, evaluations
 
 
+# The phases below have one caller; as calls of their own they would cost 4 % of a lone obstacle's warm solve.
 # --------------------------------------------------------------------------------------------- init
 
 
-@jit
+@inlined
 def _init(lo, hi, ends, node, direct):
     """Prepare the start; return (whether it is a cold one, what the rows hold of it, evaluations).
 
@@ -142,7 +143,7 @@ def _all_hinted(lo, hi, node):
 # --------------------------------------------------------------------------------- phases of a round
 
 
-@jit
+@inlined
 def _find_tangent_path(lo, hi, ends, node, tol, known):
     """Run Newton's method; return (whether the path is tangent, ||f||, known, iterations, evaluations).
 
@@ -158,7 +159,7 @@ def _find_tangent_path(lo, hi, ends, node, tol, known):
     return tangent, error, GEODESICS_EVALUATED, iterations, evaluations
 
 
-@jit
+@inlined
 def _update_active_set(lo, hi, ends, node):
     """Change what a certified path touches; return how many contacts changed, and the status that forbids a path.
 
@@ -185,7 +186,7 @@ def _mend_contacts(lo, hi, ends, node, tangent):
 # ---------------------------------------------------------------------------------------- terminate
 
 
-@jit
+@inlined
 def _terminate(lo, hi, ends, node, settled, status):
     """Return the status of the last iterate; `settled`: it is certified and needs no change."""
     if not settled:
@@ -205,7 +206,7 @@ def _terminate(lo, hi, ends, node, settled, status):
     return status
 
 
-@jit
+@inlined
 def _store(lo, hi, node, settled, repairs):
     """Leave in the rows what the next solve needs; hints that a repair has ignored count again."""
     node[lo, lay.W_REPAIRS] = repairs

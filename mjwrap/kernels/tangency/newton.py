@@ -48,7 +48,7 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     return math.sqrt(square), iterations, evaluations
 
 
-@jit
+@inlined
 def init(lo, hi, ends, node, square):
     """Evaluate the start as far as the rows do not hold it; return (||f||^2, evaluations)."""
     evaluations = 0
@@ -66,7 +66,7 @@ def init(lo, hi, ends, node, square):
     return square, evaluations
 
 
-@jit
+@inlined
 def step(lo, hi, ends, node, square):
     """Take one damped Newton step from rows that hold an evaluation with ||f||^2 = square.
 
