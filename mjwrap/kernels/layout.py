@@ -7,14 +7,16 @@ holds, in this order:
     KIND        VIA, CYLINDER, SPHERE, ...
     DIM   (4)   what the mathematics of the kind needs, below; lengths in [m]
     SIZE        length by which steps on the surface are limited, about its smallest radius of curvature [m]
+    TRAITS      what is true of the surface, as a sum of the bits below
+    Z_LIMIT     half length along local z beyond which a contact is out of range [m]; infinite where there is none
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
     HINT  (4)   flag (0 or 1), then the hint in S [m]
     S_... (11)  the saved solution: what a warm start needs, nothing else
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
-    TRAITS      what is true of the surface, as a sum of the bits below
-    Z_LIMIT     half length along local z beyond which a contact is out of range [m]; infinite where there is none
     HANDLE      address of data that lie elsewhere, 0 where there are none
+
+What is read most, KIND to Z_LIMIT, is the row's first cache line.
 
 The columns of a surface are filled by `mjwrap/surfaces/rows.py` from the surface's class, and by nothing else. Kernels
 ask for traits (`geometry/traits.py`); only `geometry/table.py` and `wraps/single.py` compare kinds.
@@ -34,9 +36,11 @@ the arrays alive. Another device has other addresses: its copy of the rows needs
 KIND = 0
 DIM = 1
 SIZE = 5
-POS = 6
-ROT = 9
-HINT = 18
+TRAITS = 6
+Z_LIMIT = 7
+POS = 8
+ROT = 11
+HINT = 20
 
 # ----------------------------------------------------------------------------------------- kinds of nodes
 VIA = 0
@@ -80,12 +84,12 @@ NO_GEODESIC = 7
 UNKNOWN_SURFACE = 8
 
 # ------------------------------------------------------------------------ columns of the saved solution
-S_MODE = 22  # COLD, FREE or TOUCHED
-S_SWEEP = 23  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
-S_P = 24  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts
-S_T = 27  # unit tangent at P in S (3); FREE, no closed form: where the straight segment ends [m]; zeros: not known
-S_ARC = 30  # arc length s [m]
-S_BEFORE = 31  # lengths of the straight segments to P and from Q, where the path was found last (2) [m]
+S_MODE = 24  # COLD, FREE or TOUCHED
+S_SWEEP = 25  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
+S_P = 26  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts
+S_T = 29  # unit tangent at P in S (3); FREE, no closed form: where the straight segment ends [m]; zeros: not known
+S_ARC = 32  # arc length s [m]
+S_BEFORE = 33  # lengths of the straight segments to P and from Q, where the path was found last (2) [m]
 STATE = 11  # how many they are
 
 COLD = -1.0
@@ -93,45 +97,43 @@ FREE = 0.0
 TOUCHED = 1.0
 
 # -------------------------------------------------------------------- columns of results and scratch
-W_P = 33  # P (3), then Q, t_P, t_Q, n_P, n_Q, b_P, b_Q (3 each)
-W_Q = 36
-W_TP = 39
-W_TQ = 42
-W_NP = 45
-W_NQ = 48
-W_BP = 51
-W_BQ = 54
-W_KP = 57  # kappa, tau, beta at P
-W_KQ = 60  # kappa, tau, beta at Q
-W_JAC = 63  # Jacobi fields a, a', r, r' at Q
-W_E = 67  # unit vector of the straight segment that arrives at P (3)
-W_L = 70  # its length [m]
-W_CP = 71  # e.t, e.n, e.b at P (3): the last two are rows 0 and 1 of the path error h
-W_CQ = 74  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves: the last two are rows 2 and 3 of h
-W_LQ = 77  # length of the segment that leaves [m]
-W_EQ = 78  # its unit vector (3)
-W_Y = 81  # block elimination: solution for the right-hand side, in the end the Newton step d0..d3 (4)
-W_X = 85  # block elimination: solution for the upper coupling (4 x 2)
-W_SAVE = 93  # P, t, s before a trial step (7)
-W_OLD = 100  # the saved solution from which the solve started (11)
-W_KMIN = 111  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
-W_RMIN = 112  # smallest of r over the arc so far: <= 0 behind a conjugate point
-W_ANGLE = 113  # about the axis from P to Q [rad]; torus: how often the hole is passed
+W_P = 35  # P (3), then Q, t_P, t_Q, n_P, n_Q, b_P, b_Q (3 each)
+W_Q = 38
+W_TP = 41
+W_TQ = 44
+W_NP = 47
+W_NQ = 50
+W_BP = 53
+W_BQ = 56
+W_KP = 59  # kappa, tau, beta at P
+W_KQ = 62  # kappa, tau, beta at Q
+W_JAC = 65  # Jacobi fields a, a', r, r' at Q
+W_E = 69  # unit vector of the straight segment that arrives at P (3)
+W_L = 72  # its length [m]
+W_CP = 73  # e.t, e.n, e.b at P (3): the last two are rows 0 and 1 of the path error h
+W_CQ = 76  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves: the last two are rows 2 and 3 of h
+W_LQ = 79  # length of the segment that leaves [m]
+W_EQ = 80  # its unit vector (3)
+W_Y = 83  # block elimination: solution for the right-hand side, in the end the Newton step d0..d3 (4)
+W_X = 87  # block elimination: solution for the upper coupling (4 x 2)
+W_SAVE = 95  # P, t, s before a trial step (7)
+W_OLD = 102  # the saved solution from which the solve started (11)
+W_KMIN = 113  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
+W_RMIN = 114  # smallest of r over the arc so far: <= 0 behind a conjugate point
+W_ANGLE = 115  # about the axis from P to Q [rad]; torus: how often the hole is passed
 TOUCH = (
-    114  # the row's number among the rows of its surface: 0, then 1, 2, ... where a string may touch it again
+    116  # the row's number among the rows of its surface: 0, then 1, 2, ... where a string may touch it again
 )
-W_LAST = 115  # the saved solution before a single wrap (11)
-W_FRESH = 126  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
-W_BEST = 127  # the shortest solution that several cold starts have found (11)
-W_START = 138  # the saved solution from which a solve over a large move started (11)
-W_LOW = 149  # height of the lowest point of a free string over the surface [m]
-W_FIRST = 150  # in a span's first row: ||f||^2 of the contacts from which it started; -1 where they are not evaluated
-W_REPAIRS = 151  # in a span's first row: how often the path was begun anew, from another start or in strides
-W_PIN = 152  # 1 where the path ends on the surface, at Q: then h holds components of Q - B; 0 else
-W_LAND = 153  # 1 while Q is to go to that end, however far it is (`end_on_surface.py`); 0 else
-INSIDE = 154  # ABOUT_POINT or ABOUT_AXIS where the string is held to the solid, alone between two fixed points; 0 else
-TRAITS = 155
-Z_LIMIT = 156
+W_LAST = 117  # the saved solution before a single wrap (11)
+W_FRESH = 128  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
+W_BEST = 129  # the shortest solution that several cold starts have found (11)
+W_START = 140  # the saved solution from which a solve over a large move started (11)
+W_LOW = 151  # height of the lowest point of a free string over the surface [m]
+W_FIRST = 152  # in a span's first row: ||f||^2 of the contacts from which it started; -1 where they are not evaluated
+W_REPAIRS = 153  # in a span's first row: how often the path was begun anew, from another start or in strides
+W_PIN = 154  # 1 where the path ends on the surface, at Q: then h holds components of Q - B; 0 else
+W_LAND = 155  # 1 while Q is to go to that end, however far it is (`end_on_surface.py`); 0 else
+INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS where the string is held to the solid, alone between two fixed points; 0 else
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
 ROW = 160  # 20 cache lines
