@@ -130,7 +130,7 @@ def _python(words: list[str]) -> str | None:
     if not script.is_file():
         return f"no file {words[0]}"
     code = script.read_text()
-    if "parse_args(" not in code and "parse_known_args(" not in code:
+    if "parse_args(" not in code and "parse_known_args(" not in code and "argparse" not in code:
         return "it takes no arguments" if words[1:] else None
     return _script(script, words[1:])
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
+from mjwrap.verification import cases, random_scenes
 from mjwrap.verification.certificate import findings, rotation
 from mjwrap.verification.scenes import gap, height
 
@@ -27,9 +28,9 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
 
 @pytest.mark.parametrize("name", ["cylinder", "torus", "cone", "5 mixed"])
 @pytest.mark.parametrize("backwards", [True, False])
-def test_scenes_are_what_they_say(bench: Callable[[str], Any], name: str, backwards: bool) -> None:
+def test_scenes_are_what_they_say(name: str, backwards: bool) -> None:
     """Ends outside, nothing overlapping; scenes made backwards have a true path, and hints near it."""
-    maker = bench("random_scenes").Maker(name, 7, 0)
+    maker = random_scenes.Maker(name, 7, 0)
     for _ in range(5):
         scene = maker.scene(backwards)
         ends = np.array([scene.origin, scene.insertion])
@@ -46,9 +47,8 @@ def test_scenes_are_what_they_say(bench: Callable[[str], Any], name: str, backwa
             assert nearest < s + 1e-3
 
 
-def test_scenes_depend_on_the_seed_alone(bench: Callable[[str], Any]) -> None:
-    scenes = bench("random_scenes")
-    first, again, other = (scenes.Maker("3 mixed", seed, 0).scene(True) for seed in (1, 1, 2))
+def test_scenes_depend_on_the_seed_alone() -> None:
+    first, again, other = (random_scenes.Maker("3 mixed", seed, 0).scene(True) for seed in (1, 1, 2))
     assert first.obstacles == again.obstacles
     assert np.array_equal(first.insertion, again.insertion)
     assert first.obstacles != other.obstacles
@@ -136,10 +136,9 @@ def test_a_longer_answer_is_counted(bench: Callable[[str], Any], monkeypatch: py
     assert all(case["reason"].startswith("LONGER") for case in saved)
 
 
-def test_saved_scenes_come_back_to_the_last_bit(bench: Callable[[str], Any]) -> None:
-    cases, scenes = bench("cases"), bench("random_scenes")
+def test_saved_scenes_come_back_to_the_last_bit() -> None:
     for name in ("torus", "cone", "capsule", "5 mixed"):
-        scene = scenes.Maker(name, 5, 0).scene(True)
+        scene = random_scenes.Maker(name, 5, 0).scene(True)
         row = scene.hinted("good")
         text = json.dumps(cases.describe(scene.origin, scene.insertion, row))
         origin, insertion, obstacles = cases.restore(json.loads(text))
@@ -149,8 +148,8 @@ def test_saved_scenes_come_back_to_the_last_bit(bench: Callable[[str], Any]) -> 
 
 
 def test_velocities_of_a_motion_are_its_derivatives(bench: Callable[[str], Any]) -> None:
-    motions, scenes = bench("motions"), bench("random_scenes")
-    motion = motions.random_motion(scenes.Maker("3 mixed", 5, 0))
+    motions = bench("motions")
+    motion = motions.random_motion(random_scenes.Maker("3 mixed", 5, 0))
     h = 1e-5
     for tau in (0.3, 2.0, 5.5):
         a, b, pos, quat = motion.poses(np.array([tau - h, tau, tau + h]))

@@ -47,7 +47,9 @@ def _evaluation() -> tuple[Any, ...]:
     """Return the types of the arguments with which `stage` calls `evaluate`."""
 
     def group(kind: Any) -> Any:
-        return types.NamedTuple(compiled_types(kind), kind)
+        return types.BaseTuple.from_types(
+            compiled_types(kind), kind
+        )  # one type for all fields is another type
 
     return (
         group(Routes), group(Muscles), group(Poses), group(Inputs), group(Timing), types.float64,
