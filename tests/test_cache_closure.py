@@ -25,6 +25,11 @@ def name_of(file: Path, package: Path) -> str:
     return ".".join(part for part in parts if part != "__init__")
 
 
+def file_of(name: str, package: Path) -> Path:
+    path = package.parent.joinpath(*name.split("."))
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
 MODULES = sorted(name_of(file, PACKAGE) for file in PACKAGE.rglob("*.py"))
 KERNELS = [
     name
@@ -58,7 +63,7 @@ def test_an_edit_counts_for_those_that_reach_it_and_no_others(name: str, package
     before = keys()
     reaching = {kernel for kernel in KERNELS if name in _closure.reached(kernel)}
     assert name in reaching
-    with kernel_file(package, name.rpartition(".")[2]).open("a") as file:
+    with file_of(name, package).open("a") as file:
         file.write("# a remark\n")
     after = keys()
     assert {kernel for kernel in KERNELS if after[kernel] != before[kernel]} == reaching
