@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.arcs import arcs_of, slow_arc
 from mjwrap.verification.certificate import Case, findings, grouped, laid_out, stiffness
 from mjwrap.verification.scenes import random_surface
@@ -32,7 +33,7 @@ def letter(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def points_on(rng: np.random.Generator, surface: mw.Surface, count: int) -> tuple[Shape, Array, Array]:
+def points_on(rng: np.random.Generator, surface: Surface, count: int) -> tuple[Shape, Array, Array]:
     """Return a surface's shape, its sizes, and random points of it, within its ends."""
     shape, d = SHAPES[type(surface)], sizes(surface)
     start = rng.normal(size=(count, 3)) * 0.05
@@ -71,7 +72,7 @@ def grazing(rng: np.random.Generator, letter: str, turn: float = 0.6) -> Case:
 
 
 def path_along(
-    surface: mw.Surface,
+    surface: Surface,
     quat: tuple[float, ...],
     pos: tuple[float, ...],
     P: Array,

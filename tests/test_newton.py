@@ -16,6 +16,7 @@ from mjwrap.kernels.geometry import geodesics, stoermer
 from mjwrap.kernels.spans import chain
 from mjwrap.kernels.tangency import block_elimination, newton, path_error, tangency_error
 from mjwrap.paths.scene import pack
+from mjwrap.surfaces import Surface
 from mjwrap.verification.scenes import random_scene
 
 Array = NDArray[np.float64]
@@ -235,7 +236,7 @@ def test_folded_path_is_not_accepted() -> None:
     "surface",
     [mw.Cylinder(0.05, 0.08), mw.Sphere(0.05), mw.EllipticCylinder((0.06, 0.04)), mw.Cone(0.06, 0.03, 0.1)],
 )
-def test_a_lone_wrap_is_the_path_that_newtons_method_finds(surface: mw.Surface) -> None:
+def test_a_lone_wrap_is_the_path_that_newtons_method_finds(surface: Surface) -> None:
     """Step after step of a motion that winds, lifts off and slides off the end of the surface: `direct` or not."""
     # an elliptic cylinder's geodesics are integrated, with this estimate of the error; the others' are closed forms
     bound = stoermer.TOLERANCE if isinstance(surface, mw.EllipticCylinder) else 1e-12

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from reference_paths import reference_scene
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.scenes import SURFACES, Array, check_path, height, outward, random_scene
 
 EXACT = 1e-12  # relative: what the references are good for (closed forms are met by them to 1e-16)
 SCENES = ["a_cyl", "b_sphere", "c_ellipsoid", "d_torus", "e3_mixed", "f_cyl01", "f_cyl02", "f_cyl04"]
 
 
-def surface_of(kind: str, dims: list[float]) -> mw.Surface:
+def surface_of(kind: str, dims: list[float]) -> Surface:
     return mw.Ellipsoid((dims[0], dims[1], dims[2])) if kind == "ellipsoid" else SURFACES[kind](*dims)
 
 

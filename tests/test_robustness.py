@@ -40,6 +40,8 @@ def test_scenes_are_what_they_say(name: str, backwards: bool) -> None:
         assert (scene.known is not None) == (scene.good is not None) == backwards
         if not backwards:
             continue
+        assert scene.known is not None
+        assert scene.good is not None
         assert findings([scene.known]) == [""]
         for o, contacts, hint in zip(scene.obstacles, scene.known.contacts, scene.good, strict=True):
             P, Q, s = contacts[0]
@@ -140,6 +142,7 @@ def test_saved_scenes_come_back_to_the_last_bit() -> None:
     for name in ("torus", "cone", "capsule", "5 mixed"):
         scene = random_scenes.Maker(name, 5, 0).scene(True)
         row = scene.hinted("good")
+        assert row is not None
         text = json.dumps(cases.describe(scene.origin, scene.insertion, row))
         origin, insertion, obstacles = cases.restore(json.loads(text))
         assert obstacles == row

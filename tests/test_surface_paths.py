@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.scenes import (
     LETTERS,
     Array,
@@ -99,7 +100,7 @@ def test_an_end_point_that_sinks_into_a_surface_has_a_status_and_a_length(letter
 # ------------------------------------------------------------------------------------- surfaces of finite length
 
 
-def cut(surface: mw.Surface, half: float) -> mw.Surface:
+def cut(surface: Surface, half: float) -> Surface:
     """Return a surface that ends at z = half and -half."""
     match surface:
         case mw.Cylinder():

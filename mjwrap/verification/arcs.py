@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.shapes import (
     SHAPES,
     Array,
@@ -302,7 +302,7 @@ def _steps(shape: Shape, d: Array, P: Array, t: Array, s: Array, count: int) -> 
 # ---------------------------------------------------------------------------------------- slow twin
 
 
-def slow_arc(surface: mw.Surface, P: Array, t: Array, s: float) -> tuple[Array, Array, Array]:
+def slow_arc(surface: Surface, P: Array, t: Array, s: float) -> tuple[Array, Array, Array]:
     """Return Q, its tangent and a, a', r, r' of one geodesic, by DOP853 at a tolerance of 1e-13; surface's frame."""
     shape, d = SHAPES[type(surface)], sizes(surface)
 

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.certificate import ENTERING, Case, deepest, rotation
 from mjwrap.verification.polish import Touch, polish
 from mjwrap.verification.shapes import SHAPES, Array, Ellipsoid, Ints, Shape, Torus, beside, dot, sizes, unit
@@ -34,7 +35,7 @@ REPAIRS = 3  # rounds of taking in what a polished path enters
 SAME = 1e-3  # relative: strings whose lengths differ by less and that touch alike are one
 
 
-def ways_round(surface: mw.Surface, quat: Sequence[float], along: Array) -> list[Array]:
+def ways_round(surface: Surface, quat: Sequence[float], along: Array) -> list[Array]:
     """Return waypoints beside a surface, relative to its centre, for a string that runs along a unit vector."""
     turn, d = rotation(quat), sizes(surface)
     match surface:

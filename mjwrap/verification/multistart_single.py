@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ellipeinc
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.arcs import arcs_of
 from mjwrap.verification.certificate import Case, deepest, rotation
 from mjwrap.verification.polish import Touch, polish
@@ -176,7 +177,7 @@ def _over_sphere(radius: float, a: Array, b: Array) -> list[tuple]:
 # ------------------------------------------------------------------------------------------ shooting
 
 
-def _horizon(surface: mw.Surface, a: Array) -> list[Array]:
+def _horizon(surface: Surface, a: Array) -> list[Array]:
     """Return the points of a surface at which rays from a graze it, as curves (m, 3) with neighbours side by side."""
     shape, d = SHAPES[type(surface)], sizes(surface)
     angle = np.linspace(0.0, 2.0 * np.pi, RAYS + 1)
@@ -227,7 +228,7 @@ def _polar_circle(a: Array, radius: float, ring: Array) -> Array:
     return radius**2 / far * up + radius * np.sqrt(1.0 - (radius / far) ** 2) * plane
 
 
-def _shot(surface: mw.Surface, a: Array, b: Array) -> list[tuple]:
+def _shot(surface: Surface, a: Array, b: Array) -> list[tuple]:
     """Return rough touches (P, t, s) of all paths from a to b over a surface, in its frame."""
     shape, d = SHAPES[type(surface)], sizes(surface)
     found = []

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.arcs import arcs_of
 from mjwrap.verification.certificate import Case, Contacts, rotation
 from mjwrap.verification.shapes import SHAPES, Array, sizes, unit
@@ -33,7 +34,7 @@ class Touch(NamedTuple):
     s: float
 
 
-def _size(surface: mw.Surface) -> float:
+def _size(surface: Surface) -> float:
     return 1.0 / float(SHAPES[type(surface)].bend(sizes(surface)))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.arcs import arcs_of
 from mjwrap.verification.certificate import ENTERING, Case, deepest, findings, rotation
 from mjwrap.verification.scenes import _clear, height, local, point_towards, random_scene, random_surface
@@ -72,7 +73,7 @@ class Scene:
 class Drawn:
     """One geodesic on one surface, in the surface's frame, that a string can lie on."""
 
-    surface: mw.Surface
+    surface: Surface
     P: Array
     t: Array
     n: Array

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.certificate import Case, findings, rotation
 from mjwrap.verification.shapes import SHAPES, Array, sizes
 
@@ -123,7 +124,7 @@ def _clear(a: mw.Obstacle, b: mw.Obstacle) -> bool:
     return a.pos[0] - b.pos[0] > 2.0 * REACH or gap(a, b) > MARGIN
 
 
-def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) -> mw.Surface:
+def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) -> Surface:
     """Return a surface at muscle scale, radii 1 to 5 cm: a letter of LETTERS; largest (0 to 1) limits its size."""
 
     def size(low: float, high: float) -> float:
@@ -149,7 +150,7 @@ def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) 
     raise ValueError(f"{letter!r} is none of {LETTERS}")
 
 
-def point_towards(surface: mw.Surface, direction: Array) -> Array:
+def point_towards(surface: Surface, direction: Array) -> Array:
     """Return a point (3,) of a surface, in its frame, on the side of a unit vector [m]."""
     if isinstance(surface, mw.Cylinder | mw.Sphere):
         return direction * surface.radius  # on the sphere; for a cylinder inside it, on that side
