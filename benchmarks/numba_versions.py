@@ -1,7 +1,7 @@
 """Run the tests of kernels, paths and machine code with several versions of numba, each in an environment of its own.
 
-Run this before the range of numba in `pyproject.toml` and `TESTED` in `mjwrap/kernels/_check.py` change: a version
-belongs there once its tests pass with `plain` "no". Each version takes some minutes.
+Run this before the range of numba in `pyproject.toml` and `TESTED` in `mjwrap/kernels/compilation/self_test.py` change:
+a version belongs there once its tests pass with `plain` "no". Each version takes some minutes.
 
     python benchmarks/numba_versions.py 0.65.1 0.66.0 0.67.0 0.68.1
     python benchmarks/numba_versions.py 0.69.0 --tests tests/test_newton.py
@@ -21,7 +21,8 @@ ROOT = Path(__file__).parents[1]
 NEEDED = ["numpy", "scipy", "mujoco<4", "sympy", "platformdirs", "pytest", "hypothesis"]
 TESTS = ["tests/test_newton.py", "tests/test_paths.py", "tests/test_cache.py", "tests/test_cache_closure.py"]
 VERDICT = (
-    "from mjwrap.kernels import _check, _folders; print('no' if _check.passes(_folders.base()) else 'yes')"
+    "from mjwrap.kernels.compilation import cache_folders, self_test; "
+    "print('no' if self_test.passes(cache_folders.base()) else 'yes')"
 )
 
 

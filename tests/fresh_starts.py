@@ -24,11 +24,11 @@ row = [mw.Obstacle(mw.Cylinder(0.03), hint=(0.0, 0.03, 0.0)), mw.ViaPoint((-0.06
        mw.Obstacle(mw.Sphere(0.02), pos=(-0.1, 0.0, 0.01), hint=(0.0, 0.02, 0.0))]
 path = mw.solve_path((0.1, 0.01, 0.0), (-0.2, 0.0, 0.02), row)
 twists = [[0.1, 0.2, 0.3, 1.0, -0.5, 0.2]] * 3
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 print(json.dumps({
     "numbers": [path.length, path.speed((0.1, 0, 0), (0, 0.2, 0), twists), *path.wrenches(5.0).ravel().tolist(),
                 *path.points(0.01).ravel().tolist()],
-    "converged": bool(path.converged), "folder": str(_folders.base())}))
+    "converged": bool(path.converged), "folder": str(cache_folders.base())}))
 """
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fresh_starts import NOTICE, SOLVE, Run, copy_of_the_package, kernel_file, run
 
-from mjwrap.kernels import _check, _closure, _places, _probe
+from mjwrap.kernels.compilation import import_closure, module_caches, probe, self_test
 
 PATIENCE = 5.0  # [s] 2 is the aim; machines that run tests are busy
 
@@ -18,19 +18,19 @@ SWEEP = (
     SOLVE.split("path =")[0]
     + """
 import numpy as np
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 pos = np.tile([[0.0, 0.0, 0.0], [-0.06, 0.01, 0.01], [-0.1, 0.0, 0.01]], (3, 1, 1))
 quat = np.tile([1.0, 0.0, 0.0, 0.0], (3, 3, 1))
 sweep = mw.solve_sweep((0.1, 0.01, 0.0), (-0.2, 0.0, 0.02), row, pos, quat)
-print(json.dumps({"numbers": sweep.length.tolist(), "folder": str(_folders.base())}))
+print(json.dumps({"numbers": sweep.length.tolist(), "folder": str(cache_folders.base())}))
 """
 )
 # A kernel that compiles in seconds, and that calls one in another file.
 PULL = """
 import json, numpy as np
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.kernels.musculotendon import fiber
-print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": str(_folders.base())}))
+print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": str(cache_folders.base())}))
 """
 
 
@@ -66,7 +66,7 @@ def test_machine_code_is_kept_in_the_users_cache(starts: Starts, monkeypatch: py
     assert folders
     for folder in folders:
         module, _, version = folder.rpartition("-")
-        assert version == _closure.key(module, *_places.circumstances())
+        assert version == import_closure.key(module, *module_caches.circumstances())
 
 
 @pytest.mark.slow
@@ -127,9 +127,9 @@ def test_an_edit_in_a_called_file_is_noticed(tmp_path: Path) -> None:
 
 LOOK = """
 import json, mjwrap as mw
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 muscles = [mw.Millard2012(100.0, 0.1, 0.2), mw.DeGrooteFregly2016(100.0, 0.1, 0.2), mw.MuscleSystem]
-print(json.dumps({"numbers": [], "folder": str(_folders.base())}))
+print(json.dumps({"numbers": [], "folder": str(cache_folders.base())}))
 """
 
 
@@ -185,12 +185,12 @@ def test_kernels_that_numba_compiles_alone_find_the_same(starts: Starts) -> None
 
 
 def test_a_verdict_on_numba_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert _check.passes(tmp_path)
-    monkeypatch.setattr(_check, "_try", lambda: pytest.fail("tried again"))
-    assert _check.passes(tmp_path)
+    assert self_test.passes(tmp_path)
+    monkeypatch.setattr(self_test, "_try", lambda: pytest.fail("tried again"))
+    assert self_test.passes(tmp_path)
     (verdict,) = tmp_path.iterdir()
     verdict.write_text("failed")
-    assert not _check.passes(tmp_path)
+    assert not self_test.passes(tmp_path)
 
 
 def test_a_numba_that_crashed_or_raised_does_not_pass(
@@ -199,24 +199,25 @@ def test_a_numba_that_crashed_or_raised_does_not_pass(
     def fail() -> bool:
         raise AttributeError("'JITCodeLibrary' object has no attribute '_reload_init'")
 
-    monkeypatch.setattr(_probe, "passes", fail)
-    assert not _check.passes(tmp_path)
+    monkeypatch.setattr(probe, "passes", fail)
+    assert not self_test.passes(tmp_path)
     (verdict,) = tmp_path.iterdir()
     verdict.write_text("begun")
     os.utime(verdict, (0, 0))  # by a process that has long ended
-    monkeypatch.setattr(_probe, "passes", lambda: True)
-    assert not _check.passes(tmp_path)
+    monkeypatch.setattr(probe, "passes", lambda: True)
+    assert not self_test.passes(tmp_path)
     os.utime(verdict)  # by one that may still be at it
-    assert _check.passes(tmp_path)
+    assert self_test.passes(tmp_path)
 
 
 UNKNOWN = """
 import json
-from mjwrap.kernels import _check
-_check.TESTED = ()
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import self_test
+self_test.TESTED = ()
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.kernels.musculotendon import fiber
-print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0], _check.is_plain()], "folder": str(_folders.base())}))
+numbers = [fiber.velocity_curve(2, 0.3)[0], self_test.is_plain()]
+print(json.dumps({"numbers": numbers, "folder": str(cache_folders.base())}))
 """
 
 
@@ -224,7 +225,9 @@ def test_an_unknown_numba_is_tried_and_one_that_does_not_fit_is_said(tmp_path: P
     fit = run(UNKNOWN, tmp_path / "fit")
     assert fit.numbers[1] is False
     assert len(fit.told) == 1  # that it compiles
-    unfit = run(UNKNOWN.replace("TESTED = ()", "TESTED, _check._try = (), lambda: False"), tmp_path / "unfit")
+    unfit = run(
+        UNKNOWN.replace("TESTED = ()", "TESTED, self_test._try = (), lambda: False"), tmp_path / "unfit"
+    )
     assert unfit.numbers == [pytest.approx(fit.numbers[0], rel=1e-14), True]
     assert len(unfit.told) == 2
     assert "numba.njit alone" in unfit.told[0]
@@ -236,11 +239,11 @@ def test_an_unknown_numba_is_tried_and_one_that_does_not_fit_is_said(tmp_path: P
 
 NAMELESS = """
 import json, types, numba
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.kernels.musculotendon import fiber
 function = types.FunctionType((lambda x: x + 1.0).__code__, {}, "nameless")
 function.__module__ = None
-print(json.dumps({"numbers": [numba.njit(function)(1.0)], "folder": str(_folders.base())}))
+print(json.dumps({"numbers": [numba.njit(function)(1.0)], "folder": str(cache_folders.base())}))
 """
 
 

@@ -15,7 +15,7 @@ import numba
 import pytest
 from fresh_starts import PACKAGE, copy_of_the_package, kernel_file, run
 
-from mjwrap.kernels import _check, _closure, _places
+from mjwrap.kernels.compilation import import_closure, module_caches, self_test
 
 CIRCUMSTANCES = ("numba", "python")
 
@@ -34,7 +34,7 @@ MODULES = sorted(name_of(file, PACKAGE) for file in PACKAGE.rglob("*.py"))
 KERNELS = [
     name
     for name in MODULES
-    if name.startswith("mjwrap.kernels.") and not name.rpartition(".")[2].startswith("_")
+    if name.startswith("mjwrap.kernels.") and not name.startswith("mjwrap.kernels.compilation")
 ]
 
 
@@ -42,17 +42,19 @@ KERNELS = [
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A copy of the package that may be edited, and is what keys are made of."""
     copy = copy_of_the_package(tmp_path)
-    monkeypatch.setattr(_closure, "_ROOT", copy)
-    monkeypatch.setattr(_closure, "_STARTED", float("inf"))  # edits of this process count like any other's
-    _closure.forget()
+    monkeypatch.setattr(import_closure, "_ROOT", copy)
+    monkeypatch.setattr(
+        import_closure, "_STARTED", float("inf")
+    )  # edits of this process count like any other's
+    import_closure.forget()
     yield copy
     monkeypatch.undo()
-    _closure.forget()
+    import_closure.forget()
 
 
 def keys() -> dict[str, str | None]:
-    _closure.forget()
-    return {name: _closure.key(name, *CIRCUMSTANCES) for name in KERNELS}
+    import_closure.forget()
+    return {name: import_closure.key(name, *CIRCUMSTANCES) for name in KERNELS}
 
 
 # --------------------------------------------------------------------------------- which sources count
@@ -61,7 +63,7 @@ def keys() -> dict[str, str | None]:
 @pytest.mark.parametrize("name", KERNELS)
 def test_an_edit_counts_for_those_that_reach_it_and_no_others(name: str, package: Path) -> None:
     before = keys()
-    reaching = {kernel for kernel in KERNELS if name in _closure.reached(kernel)}
+    reaching = {kernel for kernel in KERNELS if name in import_closure.reached(kernel)}
     assert name in reaching
     with file_of(name, package).open("a") as file:
         file.write("# a remark\n")
@@ -69,7 +71,7 @@ def test_an_edit_counts_for_those_that_reach_it_and_no_others(name: str, package
     assert {kernel for kernel in KERNELS if after[kernel] != before[kernel]} == reaching
 
 
-@pytest.mark.parametrize("name", ["_jit", "_kernel"])
+@pytest.mark.parametrize("name", ["jit", "linking"])
 def test_how_kernels_are_compiled_counts_for_all(name: str, package: Path) -> None:
     before = keys()
     with kernel_file(package, name).open("a") as file:
@@ -78,7 +80,15 @@ def test_how_kernels_are_compiled_counts_for_all(name: str, package: Path) -> No
     assert all(after[kernel] != before[kernel] for kernel in KERNELS)
 
 
-@pytest.mark.parametrize("file", ["kernels/_folders.py", "kernels/_trust.py", "text.py", "__init__.py"])
+@pytest.mark.parametrize(
+    "file",
+    [
+        "kernels/compilation/cache_folders.py",
+        "kernels/compilation/folder_owners.py",
+        "text.py",
+        "__init__.py",
+    ],
+)
 def test_what_no_machine_code_depends_on_counts_for_none(file: str, package: Path) -> None:
     before = keys()
     with (package / file).open("a") as opened:
@@ -88,7 +98,7 @@ def test_what_no_machine_code_depends_on_counts_for_none(file: str, package: Pat
 
 def test_a_path_reaches_no_energetics() -> None:
     (chain,) = (name for name in KERNELS if name.endswith(".chain"))
-    reached = {name.rpartition(".")[2] for name in _closure.reached(chain)}
+    reached = {name.rpartition(".")[2] for name in import_closure.reached(chain)}
     assert {"newton", "geodesics", "layout"} < reached
     assert not {"umberger", "power", "millard"} & reached
 
@@ -97,19 +107,19 @@ def test_what_else_starts_a_new_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another numba, another Python, checked bounds, plain functions; and each of them another one."""
     monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
     name = KERNELS[0]
-    found = [_closure.key(name, *_places.circumstances())]
+    found = [import_closure.key(name, *module_caches.circumstances())]
     with monkeypatch.context() as changed:
         changed.setenv("NUMBA_BOUNDSCHECK", "1")
-        found.append(_closure.key(name, *_places.circumstances()))
+        found.append(import_closure.key(name, *module_caches.circumstances()))
     with monkeypatch.context() as changed:
         changed.setattr(numba, "__version__", "99.0")
-        found.append(_closure.key(name, *_places.circumstances()))
+        found.append(import_closure.key(name, *module_caches.circumstances()))
     with monkeypatch.context() as changed:
         changed.setattr(sys, "version_info", (4, 0, 0, "final", 0))
-        found.append(_closure.key(name, *_places.circumstances()))
+        found.append(import_closure.key(name, *module_caches.circumstances()))
     with monkeypatch.context() as changed:
-        changed.setattr(_check, "is_plain", lambda: True)
-        found.append(_closure.key(name, *_places.circumstances()))
+        changed.setattr(self_test, "is_plain", lambda: True)
+        found.append(import_closure.key(name, *module_caches.circumstances()))
     assert None not in found
     assert len(set(found)) == len(found)
 
@@ -131,7 +141,7 @@ def imported(tree: ast.AST, package: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("name", MODULES)
 def test_no_import_is_overlooked(name: str) -> None:
-    source = _closure.read(name)
+    source = import_closure.read(name)
     assert source is not None
     path = PACKAGE.joinpath(*name.split(".")[1:])
     is_package = path.is_dir()
@@ -184,10 +194,12 @@ def test_forms_of_imports(line: str, ends: str, package: Path) -> None:
     text = line.format(p="mjwrap.kernels.sandbox") + "\n"
     (sandbox / "top.py").write_bytes(text.replace("\n", ends).encode())
     compile(text, "top.py", "exec")
-    _closure.forget()
+    import_closure.forget()
     prefix = "mjwrap.kernels.sandbox."
     found = {
-        name.removeprefix(prefix) for name in _closure.reached(f"{prefix}top") if name.startswith(prefix)
+        name.removeprefix(prefix)
+        for name in import_closure.reached(f"{prefix}top")
+        if name.startswith(prefix)
     }
     on_the_way = {name.rpartition(".")[0] for name in found} - {""}
     assert found - {"top"} - on_the_way == set(FORMS[line].split()) - on_the_way
@@ -196,9 +208,9 @@ def test_forms_of_imports(line: str, ends: str, package: Path) -> None:
 
 # ---------------------------------------------------------------------------------- in running programs
 
-LEAF = "from mjwrap.kernels._jit import jit\n\n\n@jit\ndef leaf(x):\n    return x + 1.0\n"
+LEAF = "from mjwrap.kernels.compilation.jit import jit\n\n\n@jit\ndef leaf(x):\n    return x + 1.0\n"
 MIDDLE = """
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from .. import constants as con
 from ..below.leaf import (
     leaf,  # the deepest
@@ -210,7 +222,7 @@ def middle(x):
     return con.TWO * leaf(x)
 """
 TOP = """
-from mjwrap.kernels._jit import apart
+from mjwrap.kernels.compilation.jit import apart
 from mjwrap.kernels.sandbox.between import middle as mid
 
 
@@ -220,9 +232,9 @@ def top(x):
 """
 CALL = """
 import json
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.kernels.sandbox import top
-print(json.dumps({"numbers": [top.top(1.0)], "folder": str(_folders.base())}))
+print(json.dumps({"numbers": [top.top(1.0)], "folder": str(cache_folders.base())}))
 """
 
 
@@ -265,7 +277,7 @@ def test_an_edit_in_a_sub_folder_is_noticed_by_all_that_reach_it(tmp_path: Path)
 
 WHILE_RUNNING = """
 import importlib, json, pathlib, time
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.kernels.sandbox import constants
 from mjwrap.kernels.sandbox.below import leaf
 numbers = [leaf.leaf(1.0)]
@@ -278,7 +290,7 @@ numbers.append(top.top(1.0))
 for module in (constants, leaf, top.mid, top):
     importlib.reload(module)
 numbers.append(top.top(1.0))
-print(json.dumps({"numbers": numbers, "folder": str(_folders.base())}))
+print(json.dumps({"numbers": numbers, "folder": str(cache_folders.base())}))
 """
 
 
@@ -298,7 +310,7 @@ def test_an_edit_while_a_program_runs_leaves_nothing_wrong_behind(tmp_path: Path
 
 LOCATORS = """
 import json, numba
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.kernels.sandbox import top
 print(json.dumps({"numbers": [top.top(1.0)], "folder": top.top._cache.cache_path}))
 """
@@ -329,11 +341,11 @@ def test_reading_imports_takes_little_time() -> None:
     program = textwrap.dedent(
         """
         import json, sys, time
-        from mjwrap.kernels import _closure
+        from mjwrap.kernels.compilation import import_closure
         names = json.loads(sys.argv[1])
         started = time.process_time()
         for name in names:
-            _closure.key(name)
+            import_closure.key(name)
         print(time.process_time() - started)
         """
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
-from mjwrap.kernels import _folders, _trust
+from mjwrap.kernels.compilation import cache_folders, folder_owners
 
 needs_owners = pytest.mark.skipif(os.name == "nt", reason="files have no numbered owners there")
 needs_root = pytest.mark.skipif(
@@ -31,40 +31,40 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    _folders.private.cache_clear()
+    cache_folders.private.cache_clear()
     yield tmp_path
-    _folders.private.cache_clear()
+    cache_folders.private.cache_clear()
 
 
 # --------------------------------------------------------------------------------- where it is kept
 
 
 def test_the_cache_is_where_the_user_wants_it(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert _folders.find_base() == places / "xdg" / "mjwrap"
+    assert cache_folders.find_base() == places / "xdg" / "mjwrap"
     monkeypatch.setattr(config, "CACHE_DIR", str(places / "numba"))
-    assert _folders.find_base() == places / "numba" / "mjwrap"
+    assert cache_folders.find_base() == places / "numba" / "mjwrap"
 
 
 def test_a_place_that_cannot_be_written_is_passed_over(places: Path) -> None:
     (places / "xdg").write_text("a file where a folder is wanted")
-    found = _folders.find_base()
+    found = cache_folders.find_base()
     assert found.is_relative_to(places / "temporary")
-    assert _folders.find_base() == found
+    assert cache_folders.find_base() == found
 
 
 def test_a_user_without_a_home(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    assert _folders.find_base().is_relative_to(places / "temporary")
+    assert cache_folders.find_base().is_relative_to(places / "temporary")
 
 
 @needs_root
 def test_machine_code_of_somebody_else_is_not_trusted(places: Path) -> None:
     """Anyone may make the folder in the temporary one; loading machine code runs it."""
     (places / "xdg").touch()
-    shared = _folders.find_base()
+    shared = cache_folders.find_base()
     os.chown(shared, SOMEBODY, -1)
-    found = _folders.find_base()
+    found = cache_folders.find_base()
     assert found != shared
     assert found.is_relative_to(places / "temporary")
 
@@ -73,9 +73,9 @@ def test_machine_code_of_somebody_else_is_not_trusted(places: Path) -> None:
 def test_machine_code_of_another_user_is_not_trusted(places: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As above, where this is no root."""
     (places / "xdg").touch()
-    shared = _folders.find_base()
-    monkeypatch.setattr(_trust, "trusted", lambda: {SOMEBODY, os.lstat(shared.parent).st_uid + 1})
-    found = _folders.find_base()
+    shared = cache_folders.find_base()
+    monkeypatch.setattr(folder_owners, "trusted", lambda: {SOMEBODY, os.lstat(shared.parent).st_uid + 1})
+    found = cache_folders.find_base()
     assert found != shared
     assert found.is_relative_to(places / "temporary")
 
@@ -85,11 +85,11 @@ def test_without_any_lasting_place_each_process_has_its_own(
 ) -> None:
     blocked = places / "blocked"
     blocked.touch()
-    monkeypatch.setattr(_folders, "_candidates", lambda: [blocked, blocked / "below"])
-    first = _folders.find_base()
-    assert _folders.find_base() == first
-    _folders.private.cache_clear()  # as in another process
-    second = _folders.find_base()
+    monkeypatch.setattr(cache_folders, "_candidates", lambda: [blocked, blocked / "below"])
+    first = cache_folders.find_base()
+    assert cache_folders.find_base() == first
+    cache_folders.private.cache_clear()  # as in another process
+    second = cache_folders.find_base()
     assert first != second
     assert first.is_dir()
     assert second.is_relative_to(places / "temporary")
@@ -104,12 +104,12 @@ def test_a_folder_that_others_may_write_to_is_refused(
     mode: int, places: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Loading machine code runs it; here the folder of the machine code itself is open to others."""
-    monkeypatch.setattr(_trust, "_is_private", lambda group: False)
+    monkeypatch.setattr(folder_owners, "_is_private", lambda group: False)
     open_to_all = places / "numba" / "mjwrap"
     open_to_all.mkdir(parents=True)
     open_to_all.chmod(mode)
     monkeypatch.setattr(config, "CACHE_DIR", str(places / "numba"))
-    assert _folders.find_base() == places / "xdg" / "mjwrap"
+    assert cache_folders.find_base() == places / "xdg" / "mjwrap"
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"mjwrap: no machine code is kept in {open_to_all}: ")
     assert "may write to" in line
@@ -123,13 +123,13 @@ def test_a_folder_above_counts_too(depth: int, places: Path) -> None:
     """Who may write to a folder may put another one in the place of those in it."""
     folder = places / "a" / "b" / "c" / "d"
     folder.mkdir(parents=True)
-    assert _trust.objection(folder) is None
+    assert folder_owners.objection(folder) is None
     above = folder.parents[depth - 1]
     above.chmod(0o777)
-    assert _trust.objection(folder) == f"anyone may write to {above}"
+    assert folder_owners.objection(folder) == f"anyone may write to {above}"
     above.chmod(0o1777)  # like /tmp: what is in there can only be replaced by its owner
-    assert _trust.objection(folder) is None
-    assert _trust.objection(folder / "still" / "to" / "be" / "made") is None
+    assert folder_owners.objection(folder) is None
+    assert folder_owners.objection(folder / "still" / "to" / "be" / "made") is None
 
 
 @needs_owners
@@ -139,17 +139,17 @@ def test_links_are_followed_one_by_one(places: Path) -> None:
         folder.mkdir()
     (shared / "link").symlink_to(real)
     (here / "first").symlink_to(shared / "link")
-    assert _trust.objection(here / "first") is None
+    assert folder_owners.objection(here / "first") is None
     shared.chmod(0o777)  # the second link may be turned elsewhere, though neither end is open to anyone
-    assert _trust.objection(here / "first") == f"anyone may write to {shared}"
-    assert _trust.objection(real) is None
+    assert folder_owners.objection(here / "first") == f"anyone may write to {shared}"
+    assert folder_owners.objection(real) is None
     shared.chmod(0o755)
     real.chmod(0o777)
-    assert _trust.objection(here / "first" / "mjwrap") == f"anyone may write to {real}"
+    assert folder_owners.objection(here / "first" / "mjwrap") == f"anyone may write to {real}"
     real.chmod(0o1777)
-    assert _trust.objection(here / "first") == f"anyone may write to {real}"
+    assert folder_owners.objection(here / "first") == f"anyone may write to {real}"
     (here / "round").symlink_to(here / "round")
-    assert not _folders._is_fit(here / "round" / "mjwrap", [])
+    assert not cache_folders._is_fit(here / "round" / "mjwrap", [])
 
 
 @needs_root
@@ -159,7 +159,7 @@ def test_a_folder_of_somebody_else_is_refused(depth: int, places: Path) -> None:
     folder.mkdir(parents=True)
     theirs = [folder, *folder.parents][depth]
     os.chown(theirs, SOMEBODY, -1)
-    assert _trust.objection(folder) == f"{theirs} belongs to user {SOMEBODY}"
+    assert folder_owners.objection(folder) == f"{theirs} belongs to user {SOMEBODY}"
 
 
 @needs_root
@@ -169,7 +169,7 @@ def test_a_link_of_somebody_else_is_refused(places: Path) -> None:
     link.symlink_to(places / "real")
     os.chown(link, SOMEBODY, -1, follow_symlinks=False)
     (places / "temporary").chmod(0o1777)
-    assert _trust.objection(link) == f"{link} belongs to user {SOMEBODY}"
+    assert folder_owners.objection(link) == f"{link} belongs to user {SOMEBODY}"
 
 
 @needs_owners
@@ -178,10 +178,10 @@ def test_a_private_group_may_write(places: Path, monkeypatch: pytest.MonkeyPatch
     folder = places / "folder"
     folder.mkdir()
     folder.chmod(0o775)
-    monkeypatch.setattr(_trust, "_is_private", lambda group: group == folder.stat().st_gid)
-    assert _trust.objection(folder) is None
-    monkeypatch.setattr(_trust, "_is_private", lambda group: False)
-    assert _trust.objection(folder) == f"group {folder.stat().st_gid} may write to {folder}"
+    monkeypatch.setattr(folder_owners, "_is_private", lambda group: group == folder.stat().st_gid)
+    assert folder_owners.objection(folder) is None
+    monkeypatch.setattr(folder_owners, "_is_private", lambda group: False)
+    assert folder_owners.objection(folder) == f"group {folder.stat().st_gid} may write to {folder}"
 
 
 @needs_owners
@@ -198,8 +198,8 @@ def test_which_group_is_private(
     user = pwd.struct_passwd(("me", "x", os.getuid(), 77, "", "/home/me", "/bin/sh"))
     monkeypatch.setattr(pwd, "getpwuid", lambda number: user)
     monkeypatch.setattr(grp, "getgrgid", lambda number: grp.struct_group((name, "x", number, members)))
-    assert _trust._is_private(77) is private
-    assert not _trust._is_private(78)
+    assert folder_owners._is_private(77) is private
+    assert not folder_owners._is_private(78)
 
 
 @needs_owners
@@ -207,8 +207,8 @@ def test_which_group_is_private(
 def test_new_folders_are_for_their_user_alone(mask: int, places: Path) -> None:
     before = os.umask(mask)
     try:
-        folder = _folders.find_base()
-        _folders.make_version(folder / "mjwrap.kernels.some-0123456789abcdef")
+        folder = cache_folders.find_base()
+        cache_folders.make_version(folder / "mjwrap.kernels.some-0123456789abcdef")
     finally:
         os.umask(before)
     for way in (folder, folder.parent, folder / "mjwrap.kernels.some-0123456789abcdef"):
@@ -220,8 +220,8 @@ def test_what_somebody_planted_is_not_run(tmp_path: Path) -> None:
     """Index files are pickles: whoever writes one into a folder that is open to all would run code here."""
     program = """
 import json, sys
-from mjwrap.kernels import _folders, _places
-print(json.dumps([str(_folders.base()), _places.new_place("mjwrap.kernels.layout").folder.name]))
+from mjwrap.kernels.compilation import cache_folders, module_caches
+print(json.dumps([str(cache_folders.base()), module_caches.new_place("mjwrap.kernels.layout").folder.name]))
 """
     shared = tmp_path / "shared"
     (shared / "mjwrap").mkdir(parents=True)
@@ -261,29 +261,29 @@ def test_versions_not_used_for_long_are_removed_but_the_newest(tmp_path: Path) -
     mine = [version(tmp_path, some("mjwrap.kernels.span", n), days) for n, days in enumerate(ages)]
     others = [version(tmp_path, some("mjwrap.kernels.spanner", n), 99) for n in range(4)]
     foreign = [version(tmp_path, name, 99) for name in ("matplotlib", "mjwrap.kernels.span-draft", "notes")]
-    _folders.make_version(tmp_path / some("mjwrap.kernels.span", 99))
+    cache_folders.make_version(tmp_path / some("mjwrap.kernels.span", 99))
     assert [folder.is_dir() for folder in mine] == [True, True, False, False, False]
     assert all(folder.is_dir() for folder in others + foreign)
-    _folders.make_version(tmp_path / some("mjwrap.kernels.spanner", 99))
+    cache_folders.make_version(tmp_path / some("mjwrap.kernels.spanner", 99))
     assert [folder.is_dir() for folder in others].count(True) == 2  # with the new one three, however old
     assert not list(tmp_path.glob("*.gone-*"))
 
 
 def test_none_that_was_used_of_late_is_removed(tmp_path: Path) -> None:
     folders = [version(tmp_path, some("mjwrap.kernels.span", n), 29) for n in range(20)]
-    _folders.make_version(tmp_path / some("mjwrap.kernels.span", 99))
+    cache_folders.make_version(tmp_path / some("mjwrap.kernels.span", 99))
     assert all(folder.is_dir() for folder in folders)
 
 
 def test_use_is_noted_once_a_day(tmp_path: Path) -> None:
     folder = version(tmp_path, some("mjwrap.kernels.span", 1), 40)
-    _folders.use(folder)
+    cache_folders.use(folder)
     noted = folder.stat().st_mtime
     assert noted > time.time() - 60.0
     os.utime(folder, (noted - 0.5 * DAY, noted - 0.5 * DAY))
-    _folders.use(folder)
+    cache_folders.use(folder)
     assert folder.stat().st_mtime == pytest.approx(noted - 0.5 * DAY, abs=1.0)
-    _folders.use(tmp_path / "never made")
+    cache_folders.use(tmp_path / "never made")
 
 
 def test_what_older_versions_left_is_removed(tmp_path: Path) -> None:
@@ -294,7 +294,7 @@ def test_what_older_versions_left_is_removed(tmp_path: Path) -> None:
         then = time.time() - 40 * DAY
         os.utime(folder, (then, then))
     left = version(tmp_path, f"{some('mjwrap.kernels.span', 1)}.gone-01234567", 31)
-    _folders.make_version(tmp_path / some("mjwrap.kernels.span", 2))
+    cache_folders.make_version(tmp_path / some("mjwrap.kernels.span", 2))
     assert (old.is_dir(), recent.is_dir(), left.is_dir()) == (False, True, False)
 
 
@@ -303,8 +303,8 @@ def test_processes_that_prune_at_once_and_folders_that_cannot_be_removed_do_no_h
         version(tmp_path, some("mjwrap.kernels.span", n), 40 + n)
     program = f"""
 import pathlib, sys
-from mjwrap.kernels import _folders
-_folders.make_version(pathlib.Path({str(tmp_path)!r}) / ("mjwrap.kernels.span-" + sys.argv[1] * 16))
+from mjwrap.kernels.compilation import cache_folders
+cache_folders.make_version(pathlib.Path({str(tmp_path)!r}) / ("mjwrap.kernels.span-" + sys.argv[1] * 16))
 """
     running = [subprocess.Popen([sys.executable, "-c", program, digit]) for digit in "abcd"]
     assert [process.wait() for process in running] == [0] * 4
@@ -317,13 +317,13 @@ def test_a_folder_taken_into_use_in_the_meantime_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folders = [version(tmp_path, some("mjwrap.kernels.span", n), 40 + n) for n in range(4)]
-    listed = _folders._last_use
+    listed = cache_folders._last_use
 
     def used_meanwhile(folder: Path) -> float:
         found = listed(folder)
-        _folders.use(folder)  # by another process, after it was listed
+        cache_folders.use(folder)  # by another process, after it was listed
         return found
 
-    monkeypatch.setattr(_folders, "_last_use", used_meanwhile)
-    _folders.make_version(tmp_path / some("mjwrap.kernels.span", 99))
+    monkeypatch.setattr(cache_folders, "_last_use", used_meanwhile)
+    cache_folders.make_version(tmp_path / some("mjwrap.kernels.span", 99))
     assert all(folder.is_dir() for folder in folders)

@@ -13,7 +13,7 @@ from cli_runs import CASE2, ELBOW, ENTERS, ROOT, Ran, environment, finish, run_h
 
 from mjwrap.cli import main
 from mjwrap.cli.main import COMMANDS
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 
 
 def test_help_names_every_command_and_its_examples(capsys: pytest.CaptureFixture[str]) -> None:
@@ -188,7 +188,7 @@ def test_check_passes_or_fails_by_its_exit_code(capsys: pytest.CaptureFixture[st
 
 def test_warmup_leaves_nothing_to_compile(capsys: pytest.CaptureFixture[str]) -> None:
     first = json.loads(run_here("warmup", capsys, "--json").out)
-    assert Path(first["folder"]) == _folders.base()
+    assert Path(first["folder"]) == cache_folders.base()
     again = json.loads(finish(start("warmup", ELBOW, "--json")).out)
     assert (again["compiled"], again["folder"]) == (0, first["folder"])
     assert [part["part"] for part in again["parts"]] == ["paths", "muscles", "plugin", "recording", ELBOW]

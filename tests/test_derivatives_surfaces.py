@@ -13,7 +13,7 @@ from derivative_scenes import SURFACES, Array, exponential
 
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.geometry import geodesics, table
+from mjwrap.kernels.geometry import dispatch, geodesics
 from mjwrap.kernels.solved import contact_rates, hessian
 from mjwrap.kernels.tangency import newton
 from mjwrap.paths.scene import pack
@@ -77,7 +77,7 @@ def start(rng: np.random.Generator, surface: mw.Sphere | mw.Torus, row: Array) -
         near += surface.minor_radius * rng.normal(size=3)
     elif isinstance(surface, mw.Cone):
         near[2] = rng.uniform(-0.02, 0.02)
-    found = np.array(table.project(row[None, :], 0, *near))
+    found = np.array(dispatch.project(row[None, :], 0, *near))
     tangent = np.cross(found[3:], rng.normal(size=3))
     return found[:3], tangent / np.linalg.norm(tangent), found[3:]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.geometry import geodesics
-from mjwrap.kernels.geometry.table import height, project
+from mjwrap.kernels.geometry.dispatch import height, project
 from mjwrap.surfaces import Surface
 from mjwrap.surfaces.rows import write_surface
 

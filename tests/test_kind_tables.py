@@ -15,10 +15,10 @@ from test_path_failures import SCENE
 import mjwrap as mw
 from mjwrap.errors import GeometryError, ModelError, StateError
 from mjwrap.kernels import layout as lay
+from mjwrap.kernels.geometry import dispatch as kinds
 from mjwrap.kernels.geometry import geodesics
-from mjwrap.kernels.geometry import table as kinds
-from mjwrap.kernels.musculotendon import activation_dynamics, early_activation, fiber, power, tension
-from mjwrap.kernels.musculotendon import table as laws
+from mjwrap.kernels.musculotendon import actearly, activation_dynamics, fiber, power, tension
+from mjwrap.kernels.musculotendon import dispatch as laws
 from mjwrap.kernels.spans import chain
 from mjwrap.mjcf.parameters import FIBER_LAWS
 from mjwrap.mjcf.wrapping_geoms import SIZES
@@ -262,7 +262,7 @@ def test_functions_of_an_unknown_law_give_nothing() -> None:
 def test_an_unknown_form_of_activation_dynamics_gives_nothing() -> None:
     assert math.isnan(activation_dynamics.rate(7, 0.5, 0.2, 0.01, 0.04, 10.0))
     assert math.isnan(activation_dynamics.advance(7, 0.2, 0.5, 0.01, 0.04, 10.0, 0.001))
-    assert math.isnan(early_activation.next_activation(9, np.ones((1, 5)), 0, 0.2, 0.5, 0.001))
+    assert math.isnan(actearly.next_activation(9, np.ones((1, 5)), 0, 0.2, 0.5, 0.001))
 
 
 def test_a_law_of_an_unknown_code_is_refused() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import mjwrap as mw
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import config
+from mjwrap.kernels.compilation.jit import config
 from mjwrap.kernels.geometry import geodesics, stoermer
 from mjwrap.kernels.spans import chain
 from mjwrap.kernels.tangency import block_elimination, newton, path_error, tangency_error

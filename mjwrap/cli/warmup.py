@@ -26,7 +26,7 @@ import mjwrap as mw
 from mjwrap.cli.common.arguments import add_json
 from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 from mjwrap.runs.models import load
 from mjwrap.text import counted
 
@@ -114,7 +114,7 @@ def warm_up(settings: WarmupSettings) -> int:
             parts.append(part)
     finally:
         event.unregister("numba:compile", count)
-    folder = _folders.base()
+    folder = cache_folders.base()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     report.say(f"{'compiled' if count.compiled else 'nothing to compile'}; {size / 1e6:.0f} MB in {folder}")
     report.finish({"parts": parts, "compiled": count.compiled, "folder": str(folder), "bytes": size})

@@ -19,13 +19,13 @@ holds, in this order:
 What is read most, KIND to Z_LIMIT, is the row's first cache line.
 
 The columns of a surface are filled by `mjwrap/surfaces/rows.py` from the surface's class, and by nothing else. Kernels
-ask for traits (`geometry/traits.py`); only `geometry/table.py` and `wraps/single.py` compare kinds.
+ask for traits (`geometry/traits.py`); only `geometry/dispatch.py` and `wraps/single.py` compare kinds.
 
 Several touches. A string may touch a surface with hollows more than once. Such a surface has as many consecutive
 rows as its class says (`touches`), the same in all columns but TOUCH, which numbers them: 0, 1, 2, ... The rows behind
 the first are known by TOUCH > 0. Each row has a saved solution of its own, so a saved branch has one line per row. What
-moves contacts between rows (`spans/active_set.py`) looks at a row and the next one, whatever their numbers. Two rows a
-surface are in use and tested so far; the hint stands in the first.
+moves contacts between rows (`spans/lift_off_touchdown.py`) looks at a row and the next one, whatever their numbers. Two
+rows a surface are in use and tested so far; the hint stands in the first.
 
 Data elsewhere. Addresses and handles stand in float64 columns, which hold every integer below 2**53. A user's surface
 (CUSTOM) keeps the addresses of its three functions in DIM + 1 to DIM + 3. A surface that needs arrays, such as a mesh,

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mjwrap.errors import ModelError
-from mjwrap.kernels.musculotendon import early_activation
+from mjwrap.kernels.musculotendon import actearly
 from mjwrap.mjcf.inside import end_is_inside, side_is_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import geoms_of, tendon_stops
@@ -28,10 +28,10 @@ _NO_BIAS, _MUSCLE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjB
 _DYN = mujoco.mjtDyn
 # dyntypes whose next activation the kernels can compute, for actuators with `actearly`, which act with that one
 ACTEARLY_DYNAMICS = {
-    int(_DYN.mjDYN_INTEGRATOR): early_activation.INTEGRATOR,
-    int(_DYN.mjDYN_FILTER): early_activation.FILTER,
-    int(_DYN.mjDYN_FILTEREXACT): early_activation.FILTER_EXACT,
-    int(_DYN.mjDYN_MUSCLE): early_activation.MUSCLE,
+    int(_DYN.mjDYN_INTEGRATOR): actearly.INTEGRATOR,
+    int(_DYN.mjDYN_FILTER): actearly.FILTER,
+    int(_DYN.mjDYN_FILTEREXACT): actearly.FILTER_EXACT,
+    int(_DYN.mjDYN_MUSCLE): actearly.MUSCLE,
 }
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.coupling.groups import Routes
-from mjwrap.kernels.musculotendon import dynamics, table
+from mjwrap.kernels.musculotendon import dispatch, dynamics
 from mjwrap.kernels.musculotendon.groups import Muscles
 from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
 from mjwrap.muscles.laws import ActuatorForce, parameter_row
@@ -137,7 +137,7 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         routes=np.array(routes, dtype=np.int64).reshape(-1, muscle_paths.ROUTE),
         weights=np.array(weights, dtype=np.float64),
         law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
-        params=np.array([parameter_row(m.parameters) for m in muscles]).reshape(n, table.PARAMS),
+        params=np.array([parameter_row(m.parameters) for m in muscles]).reshape(n, dispatch.PARAMS),
         source=np.array([s[0] for s in sources], dtype=np.int64),
         index=np.array([s[1] for s in sources], dtype=np.int64),
         control=np.array([s[2] for s in sources], dtype=np.int64),

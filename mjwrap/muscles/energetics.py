@@ -15,8 +15,8 @@ from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.kernels.musculotendon import power as kernel
 from mjwrap.kernels.musculotendon import umberger
+from mjwrap.kernels.musculotendon.dispatch import has_fiber
 from mjwrap.kernels.musculotendon.fiber import F_MAX, OPTIMAL
-from mjwrap.kernels.musculotendon.table import has_fiber
 
 Vector = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Musculotendon parameters: one frozen, validated dataclass per law, and the list of laws.
 
-A law fills one row of the kernels' parameter table; the kernels' side is `mjwrap/kernels/musculotendon/table.py`. How
-to add one: docs/adding_laws.md.
+A law fills one row of the kernels' parameter table; the kernels' side is `mjwrap/kernels/musculotendon/dispatch.py`.
+How to add one: docs/adding_laws.md.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import ClassVar, Protocol
 
 from mjwrap import validation
 from mjwrap.errors import ModelError
-from mjwrap.kernels.musculotendon import degroote_fregly, millard, table
+from mjwrap.kernels.musculotendon import degroote_fregly, dispatch, millard
 from mjwrap.kernels.musculotendon.mujoco_muscle import MINVAL
 
 TENDONS = ("rigid", "elastic")
@@ -216,7 +216,7 @@ class MuJoCoMuscle:
     gear: float = 1.0
     force_range: tuple[float, float] = (-math.inf, math.inf)
     passive: tuple[float, ...] | None = None
-    code: ClassVar[int] = table.MUJOCO
+    code: ClassVar[int] = dispatch.MUJOCO
     law: ClassVar[str] = "mujoco"
     needs: ClassVar[tuple[str, ...]] = ()
     takes: ClassVar[tuple[str, ...]] = ()
@@ -261,7 +261,7 @@ class MuJoCoMuscle:
 class ActuatorForce:
     """The force that MuJoCo computes for an actuator of any kind, whose path is mjwrap's; no tension here."""
 
-    code: ClassVar[int] = table.PATH_ACTUATOR
+    code: ClassVar[int] = dispatch.PATH_ACTUATOR
     law: ClassVar[str] = "mujoco"
     needs: ClassVar[tuple[str, ...]] = ()
     takes: ClassVar[tuple[str, ...]] = ()
@@ -290,7 +290,7 @@ class PathActuator:
     """
 
     optimal_force: float
-    code: ClassVar[int] = table.PATH_ACTUATOR
+    code: ClassVar[int] = dispatch.PATH_ACTUATOR
     law: ClassVar[str] = "path_actuator"
     needs: ClassVar[tuple[str, ...]] = ("optimal_force",)
     takes: ClassVar[tuple[str, ...]] = ()
@@ -323,7 +323,7 @@ LAWS: dict[str, type[Law]] = {
 
 def parameter_row(law: Law) -> tuple[float, ...]:
     """Return a law's parameters, padded to the kernels' columns; `ModelError` for a code that they do not know."""
-    if not table.known(law.code):
+    if not dispatch.known(law.code):
         raise ModelError(f"{law.law}: the kernels know no law of code {law.code!r}")
     row = law.row()
-    return (*row, *[0.0] * (table.PARAMS - len(row)))
+    return (*row, *[0.0] * (dispatch.PARAMS - len(row)))

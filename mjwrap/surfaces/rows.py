@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
-from mjwrap.kernels.geometry.table import known
+from mjwrap.kernels.geometry.dispatch import known
 from mjwrap.surfaces.surface import Surface
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjwrap.errors import StateError
 from mjwrap.kernels.coupling import finite_checks
-from mjwrap.kernels.geometry.table import height
+from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.mjcf import MuscleDeclaration, name_of
 from mjwrap.model.arrays import kernel_rows
 

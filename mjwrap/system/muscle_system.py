@@ -16,7 +16,7 @@ from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import from_python, wrenches
 from mjwrap.kernels.musculotendon import dynamics
-from mjwrap.kernels.musculotendon.table import PATH_ACTUATOR
+from mjwrap.kernels.musculotendon.dispatch import PATH_ACTUATOR
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets

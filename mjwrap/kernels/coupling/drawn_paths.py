@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.coupling.muscle_paths import R_HI, R_LO, R_MUSCLE
 from mjwrap.kernels.solved.polyline import polyline
 from mjwrap.kernels.solved.segments import G_A, G_B, G_FAR

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import apart
+from mjwrap.kernels.compilation.jit import apart
 from mjwrap.kernels.coupling.muscle_paths import measure_muscles, solve_routes
 from mjwrap.kernels.coupling.wrenches import body_wrenches
 from mjwrap.kernels.musculotendon.dynamics import drive_muscles, read_states

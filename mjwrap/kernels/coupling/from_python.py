@@ -5,7 +5,7 @@ A named group costs about 2 us at the border between Python and compiled code, a
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.coupling import evaluation, moments
 from mjwrap.kernels.coupling.groups import Dofs, Paths, Poses, Routes
 from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart, Timing

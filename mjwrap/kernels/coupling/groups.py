@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mjwrap.kernels._types import FloatRows, Floats, Indices, IntRows, Ints
+from mjwrap.kernels.array_types import FloatRows, Floats, Indices, IntRows, Ints
 
 
 class Routes(NamedTuple):

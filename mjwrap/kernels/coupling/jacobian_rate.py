@@ -8,7 +8,7 @@ mjData and mjModel have their shapes and frames.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.coupling.muscle_paths import (
     L_BODY,
     R_FROM,

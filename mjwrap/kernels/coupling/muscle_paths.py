@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, VANISHING, list_segments
 from mjwrap.kernels.spans.chain import solve_chain
 from mjwrap.kernels.spans.end_inside import has_valid_length, list_pulling_segments

@@ -7,7 +7,7 @@ starts (T, K + 1) holds the row at which each part of a frame begins, and the ro
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.coupling.drawn_paths import route_contacts, route_points
 from mjwrap.kernels.coupling.groups import Dofs, Paths, Routes
 from mjwrap.kernels.coupling.moments import length_jacobian

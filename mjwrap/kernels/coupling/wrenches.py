@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, R_SURFACES, ends, moment
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 

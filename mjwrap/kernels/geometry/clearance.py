@@ -1,13 +1,13 @@
 """Where a straight segment is lowest over a surface, where that has a formula; and how it passes a torus' tube.
 
-Everything in the frame S of the obstacle, between the points A and B. `table.py` chooses, and samples the others.
+Everything in the frame S of the obstacle, between the points A and B. `dispatch.py` chooses, and samples the others.
 """
 
 from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.quadric import inverse_squares
 
 

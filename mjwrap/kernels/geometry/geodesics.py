@@ -1,12 +1,12 @@
-"""A row's geodesic in the world, evaluated and displaced; the surface's own part is chosen by `table.py`."""
+"""A row's geodesic in the world, evaluated and displaced; the surface's own part is chosen by `dispatch.py`."""
 
 from __future__ import annotations
 
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, jit
-from mjwrap.kernels.geometry.table import evaluate_geodesic, project
+from mjwrap.kernels.compilation.jit import apart, jit
+from mjwrap.kernels.geometry.dispatch import evaluate_geodesic, project
 from mjwrap.kernels.geometry.vectors import cross
 
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ

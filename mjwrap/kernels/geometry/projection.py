@@ -1,6 +1,6 @@
 """Frames of rows, and per surface the nearest point with its normal and the signed height over it.
 
-Everything but the first two functions in the frame S of the obstacle; `table.py` chooses among them. The height is
+Everything but the first two functions in the frame S of the obstacle; `dispatch.py` chooses among them. The height is
 negative inside, positive outside, and to first order the distance where it is small.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.closed_forms import capsule_normal
 from mjwrap.kernels.geometry.quadric import inverse_squares, onto
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.geometry.stoermer import (
     DOUBT,
     INVERSE,

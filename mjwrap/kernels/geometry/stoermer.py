@@ -19,8 +19,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from mjwrap.kernels._check import is_plain
-from mjwrap.kernels._jit import config, inlined
+from mjwrap.kernels.compilation.jit import config, inlined
+from mjwrap.kernels.compilation.self_test import is_plain
 
 LANES = 8
 ROWS = 10  # of doubles that a step keeps for each lane

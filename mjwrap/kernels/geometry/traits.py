@@ -6,7 +6,7 @@ The class of the surface says it (`mjwrap/surfaces/surface.py`); no kernel concl
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 TRAITS = lay.TRAITS
 

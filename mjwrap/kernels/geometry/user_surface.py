@@ -23,7 +23,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import config, jit
+from mjwrap.kernels.compilation.jit import config, jit
 from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, put_start
 
 GEODESIC, PROJECT, HEIGHT = lay.DIM + 1, lay.DIM + 2, lay.DIM + 3  # columns of the addresses

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.clearance import tube_angle, tube_crossing
 from mjwrap.kernels.geometry.projection import turn_into_frame
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 ZAJAC = 0
 SMOOTH = 1

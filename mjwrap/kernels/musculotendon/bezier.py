@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 CLOSE = 1e-9  # last Newton step where the slope is far from zero
 ROUNDING = 1e-16

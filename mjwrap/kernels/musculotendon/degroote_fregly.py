@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 CODE = 2
 LEAST = 0.2  # shortest fibre [l_o]: there the passive curve is zero, and negative below

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.musculotendon.actearly import next_activation
 from mjwrap.kernels.musculotendon.activation_dynamics import advance, rate
-from mjwrap.kernels.musculotendon.early_activation import next_activation
+from mjwrap.kernels.musculotendon.dispatch import has_fiber
 from mjwrap.kernels.musculotendon.fiber import (
     ELASTIC,
     LEAST,
@@ -21,7 +22,6 @@ from mjwrap.kernels.musculotendon.fiber import (
     step_fiber,
     tendon_force,
 )
-from mjwrap.kernels.musculotendon.table import has_fiber
 from mjwrap.kernels.musculotendon.tension import tension as law_tension
 
 # where a muscle's state comes from

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
-from mjwrap.kernels.musculotendon.table import (
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.musculotendon.dispatch import (
     exponential_tendon,
     law_balancing_velocity,
     length_curves,

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.musculotendon.dispatch import length_curves, tendon_curve, velocity_curve
 from mjwrap.kernels.musculotendon.equilibrium import (
     AT_MINIMUM,
     CLOSE,
@@ -22,7 +23,6 @@ from mjwrap.kernels.musculotendon.equilibrium import (
     balancing_velocity,
     rest_imbalance,
 )
-from mjwrap.kernels.musculotendon.table import length_curves, tendon_curve, velocity_curve
 from mjwrap.kernels.musculotendon.third_order_step import advance_third_order
 
 # Columns of params: F_max [N], l_o [m], l_s [m], pennation at l_o [rad], v_max [l_o/s], fibre damping [F_max per v_max

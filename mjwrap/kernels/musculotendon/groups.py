@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mjwrap.kernels._types import Flags, FloatRows, Floats, Ints, Number
+from mjwrap.kernels.array_types import Flags, FloatRows, Floats, Ints, Number
 
 
 class Muscles(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon import bezier
 
 CODE = 3

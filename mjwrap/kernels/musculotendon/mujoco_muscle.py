@@ -7,7 +7,7 @@ force (biasprm): 15 range0, 16 range1, 17 force, 18 scale, 19 lmax, 20 fpmax.
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 CODE = 1
 RANGE, ACC0, GEAR, LIMITS, PASSIVE = 9, 11, 12, 13, 15  # first columns of the groups above

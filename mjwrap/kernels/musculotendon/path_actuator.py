@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 CODE = 0
 

@@ -13,17 +13,17 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon import fiber
 from mjwrap.kernels.musculotendon import tension as muscle
-from mjwrap.kernels.musculotendon.fiber import DAMPING, ELASTIC, F_MAX, HEIGHT, LEAST, OPTIMAL, SLACK, V_MAX
-from mjwrap.kernels.musculotendon.table import (
+from mjwrap.kernels.musculotendon.dispatch import (
     has_fiber,
     length_curves,
     passive_energy,
     tendon_energy,
     velocity_curve,
 )
+from mjwrap.kernels.musculotendon.fiber import DAMPING, ELASTIC, F_MAX, HEIGHT, LEAST, OPTIMAL, SLACK, V_MAX
 from mjwrap.kernels.musculotendon.umberger import metabolic_power
 
 # Rows of what `energetics` fills.

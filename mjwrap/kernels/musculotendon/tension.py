@@ -1,14 +1,14 @@
 """Tension of a musculotendon unit from activation, length and lengthening speed.
 
-`table.py` lists the laws. Pennation and the tendon of those with a fibre are `fiber.py`'s. SI units; tension is never
+`dispatch.py` lists the laws; `fiber.py` has pennation and tendon of those with a fibre. SI units; tension is never
 negative.
 """
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.musculotendon.dispatch import fiberless_tension, has_fiber
 from mjwrap.kernels.musculotendon.fiber import rigid_tension
-from mjwrap.kernels.musculotendon.table import fiberless_tension, has_fiber
 
 
 @jit

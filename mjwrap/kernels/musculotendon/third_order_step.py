@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon.equilibrium import AT_MINIMUM, CLOSE, balance, balanced_forces, forces
 
 SURE = 3e-2  # [F_max] imbalance of a prediction up to which its slopes are good enough for the scheme

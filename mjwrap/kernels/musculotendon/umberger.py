@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 # Columns of the constants: muscle mass [kg], slow-twitch ratio, aerobic factor, least heat rate [W/kg], factor of
 # effort, 1 for recruitment after Bhargava, 1 for negative work (2003), 1 where a muscle's power must not be negative.

@@ -6,7 +6,7 @@ along b ("Stiffness and sliding contacts" in docs/derivation.md; `hessian.py` fi
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.solved.hessian import FLAT, NO_FAULT, sideways_shifts
 from mjwrap.kernels.solved.path_points import (
     CORNER,

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.solved.inside_corners import list_corner, slide_corner, stiffen_corner, turn_corner
 from mjwrap.kernels.solved.path_points import (
     CORNER,

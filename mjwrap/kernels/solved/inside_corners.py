@@ -12,7 +12,7 @@ the surface's angular velocity. The corner stands between fixed points, so that 
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.solved.path_points import (
     D_BEND,
     D_C,

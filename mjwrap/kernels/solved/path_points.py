@@ -5,7 +5,7 @@ Nodes that are not touched have none. `hessian.py` says what a row is for.
 
 from __future__ import annotations
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 
 D_SLOT = 0
 D_TOUCHED = 1  # FIXED, TANGENT or CORNER

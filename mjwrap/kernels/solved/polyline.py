@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.geodesics import geodesic
 
 W_P, W_Q, W_TP, S_ARC, S_MODE = lay.W_P, lay.W_Q, lay.W_TP, lay.S_ARC, lay.S_MODE

@@ -11,12 +11,12 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import allocating, jit
+from mjwrap.kernels.compilation.jit import allocating, jit
+from mjwrap.kernels.geometry.dispatch import known
 from mjwrap.kernels.geometry.geodesics import displace
-from mjwrap.kernels.geometry.table import known
 from mjwrap.kernels.spans.cold_start import path_length
 from mjwrap.kernels.spans.end_inside import has_valid_length
-from mjwrap.kernels.spans.large_moves import solve_span
+from mjwrap.kernels.spans.span_solver import solve_span
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.tangency_error import evaluate
 from mjwrap.kernels.wraps.held_inside import solve_held_inside

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.wraps.single import wrap
 
 KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT

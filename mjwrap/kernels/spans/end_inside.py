@@ -24,13 +24,13 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, inlined, jit
+from mjwrap.kernels.compilation.jit import apart, inlined, jit
+from mjwrap.kernels.geometry.dispatch import nearest
 from mjwrap.kernels.geometry.projection import into_frame
-from mjwrap.kernels.geometry.table import nearest
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, list_segments
+from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
-from mjwrap.kernels.spans.span import solve_active_set
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 from mjwrap.kernels.wraps.single import contains
 
@@ -100,7 +100,7 @@ def _free(lo, hi, node):
 def substitute_path(lo, hi, ends, node, tol, direct):
     """Find the substitute path of a span with an end inside; return (length, error, iterations, evaluations).
 
-    ends, tol and direct as in `large_moves.solve_span`. The error is NO_SUBSTITUTE where there is none. The saved
+    ends, tol and direct as in `span_solver.solve_span`. The error is NO_SUBSTITUTE where there is none. The saved
     solution is that of the substitute path, but for the surfaces that it ignores, which keep the sides of the way from
     F.
     """

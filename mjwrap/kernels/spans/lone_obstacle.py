@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
-from mjwrap.kernels.spans.active_set import follow_branch, in_range
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.spans.active_set_method import ends_in_short_segment
 from mjwrap.kernels.spans.cold_start import path_length
+from mjwrap.kernels.spans.lift_off_touchdown import follow_branch, in_range
 from mjwrap.kernels.spans.saved_solutions import save_solutions
-from mjwrap.kernels.spans.span import ends_in_short_segment
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.tangency_error import connect_segments
 from mjwrap.kernels.wraps.single import wrap
@@ -33,7 +33,7 @@ def solve_lone_obstacle(k, ends, node, tol):
     error = 0.0
     if node[k, S_MODE] == lay.TOUCHED:
         error = math.sqrt(connect_segments(k, hi, ends, node))
-        # the checks of `span.solve_active_set`, the cheapest first
+        # the checks of `active_set_method.solve_active_set`, the cheapest first
         good = good and error <= tol and not ends_in_short_segment(k, hi, node)
         good = good and follow_branch(k, hi, node) and is_local_minimum(k, hi, node)
         good = good and in_range(k, hi, ends, node)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.geodesics import geodesic
 
 S_MODE = lay.S_MODE

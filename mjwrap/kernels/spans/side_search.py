@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.traits import branched, closed_form, drawn_hints
 from mjwrap.kernels.geometry.winding import TWO_PI
-from mjwrap.kernels.spans.active_set import (
+from mjwrap.kernels.spans.cold_start import ends_of_part, path_length, wrap_in_turn
+from mjwrap.kernels.spans.lift_off_touchdown import (
     MERGE_DISTANCE,
     follow_branch,
     in_range,
@@ -23,7 +24,6 @@ from mjwrap.kernels.spans.active_set import (
     split_at_hollow,
     touchdown,
 )
-from mjwrap.kernels.spans.cold_start import ends_of_part, path_length, wrap_in_turn
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
@@ -56,7 +56,7 @@ UNTOUCHED_CHANCE = 0.25  # that a pattern leaves an obstacle untouched
 def pull_tight(lo, hi, ends, node):
     """Make the path over lo..hi tangent, from what it touches now; return whether it is certified, and the evaluations.
 
-    What `span.solve_active_set` does, without its repairs and to a lower tolerance: a trial that fails is given up.
+    As `active_set_method.solve_active_set`, but without restarts and to a larger tolerance: a failed trial is given up.
     """
     spent = 0
     for _ in range(MAX_CHANGES):

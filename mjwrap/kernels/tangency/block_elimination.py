@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.tangency.path_error import (
     path_error_jacobian_at_P,
     path_error_jacobian_at_Q,

@@ -16,7 +16,7 @@ The pivots a + k r and 1/L + k are all positive where the path is a minimum (Jac
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit
 
 S_MODE, TOUCHED, SIZE = lay.S_MODE, lay.TOUCHED, lay.SIZE
 W_BP, W_BQ, W_JAC, W_L, W_LQ, W_X, W_Y = lay.W_BP, lay.W_BQ, lay.W_JAC, lay.W_L, lay.W_LQ, lay.W_X, lay.W_Y

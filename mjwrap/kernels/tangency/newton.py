@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, inlined, jit
+from mjwrap.kernels.compilation.jit import apart, inlined, jit
+from mjwrap.kernels.geometry.dispatch import project
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.projection import into_frame
-from mjwrap.kernels.geometry.table import project
 from mjwrap.kernels.tangency.block_elimination import solve_newton_system
 from mjwrap.kernels.tangency.path_error import dot_columns
 from mjwrap.kernels.tangency.tangency_error import connect_segments, ends_on_surface, evaluate

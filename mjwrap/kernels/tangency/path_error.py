@@ -23,7 +23,7 @@ geodesic moves" and "Newton's step" in docs/derivation.md.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined
+from mjwrap.kernels.compilation.jit import inlined
 
 W_TP, W_TQ, W_NP, W_NQ, W_BP, W_BQ = lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ, lay.W_BP, lay.W_BQ
 W_KP, W_KQ = lay.W_KP, lay.W_KQ

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.tangency.path_error import SHORTEST, path_error_at_P, path_error_at_Q
 

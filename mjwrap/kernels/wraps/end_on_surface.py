@@ -11,15 +11,15 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.geometry.dispatch import height, project
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.table import height, project
 from mjwrap.kernels.geometry.vectors import unit
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
-from mjwrap.kernels.wraps.half_planes import perpendicular
+from mjwrap.kernels.wraps.initial_guess import perpendicular
 from mjwrap.kernels.wraps.ruled import INSIDE
 
 SIZE, POS, ROT = lay.SIZE, lay.POS, lay.ROT

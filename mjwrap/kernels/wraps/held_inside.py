@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels.compilation.jit import apart, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.vectors import rotate
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
@@ -160,7 +160,7 @@ def normal(k, x, y, z, node):
 def solve_held_inside(k, ends, node, tol):
     """Find the shortest string from A to B that meets obstacle k's solid; return (status, length, error, steps).
 
-    ends as in `large_moves.solve_span`. Writes the saved solution and, where there is a corner, what `segments` reads:
+    ends as in `span_solver.solve_span`. Writes the saved solution and, where there is a corner, what `segments` reads:
     P = Q and the directions of the segments that meet there.
     """
     x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
 from mjwrap.kernels.geometry.winding import TWO_PI, follow, tangents_sweep
 

@@ -1,8 +1,8 @@
 """Wraps without a closed form: a search among guesses in half planes through A and B, polished by Newton's method.
 
-A taut string between A and B that touches a surface runs near a plane through A and B. Half planes all round AB
-give guesses for every side (`half_planes.py`); Newton's method makes paths of them, and the certificate discards those
-on which no string would hold. "Wraps without a closed form" in docs/derivation.md.
+A taut string between A and B that touches a surface runs near a plane through A and B. Half planes all round AB give
+guesses for every side (`initial_guess.py`); Newton's method makes paths of them, and the certificate discards those on
+which no string would hold. "Wraps without a closed form" in docs/derivation.md.
 
 Around a torus the side is topological, as around a cylinder: the angle that the string sweeps about the middle of the
 tube. Bounded convex surfaces have no such number: there the path keeps to the minimum that it is on.
@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.geometry.dispatch import dip, project, straight_swept, swept
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.table import dip, project, straight_swept, swept
 from mjwrap.kernels.geometry.traits import branched, hollow
 from mjwrap.kernels.geometry.winding import follow
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED
@@ -28,7 +28,7 @@ from mjwrap.kernels.wraps.end_on_surface import (
     polish_shot,
     shoot_geodesics,
 )
-from mjwrap.kernels.wraps.half_planes import (
+from mjwrap.kernels.wraps.initial_guess import (
     guess_in_half_plane,
     perpendicular,
     place_contact,
@@ -58,7 +58,7 @@ def _on_branch(k, node, known, before):
 def _leave_free(k, node, sweep, low, ax, ay, az, bx, by, bz):
     """Leave the surface untouched by the straight segment from A to B, and save where that runs, in S.
 
-    A large move needs it, to tell on which side of the surface the string was (`large_moves.py`).
+    A large move needs it, to tell on which side of the surface the string was (`span_solver.py`).
     """
     set_free(node, k, sweep)
     node[k, lay.W_LOW] = low

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels.compilation.jit import apart, jit
+from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import into_frame, turn_into_frame
-from mjwrap.kernels.geometry.table import height
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.geometry.winding import tangents_sweep
 from mjwrap.kernels.wraps.ruled import (

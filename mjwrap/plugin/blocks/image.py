@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.musculotendon import mujoco_muscle
-from mjwrap.kernels.musculotendon.table import MUJOCO
+from mjwrap.kernels.musculotendon.dispatch import MUJOCO
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.marks import limit_marks

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
-from mjwrap.kernels.musculotendon.table import MUJOCO
+from mjwrap.kernels.musculotendon.dispatch import MUJOCO
 from mjwrap.mjcf import MuscleDeclaration, Node
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.callbacks import block as bk

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numba
 
-from mjwrap.kernels._places import kept
+from mjwrap.kernels.compilation.module_caches import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "cache": True}

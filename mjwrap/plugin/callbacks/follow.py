@@ -14,7 +14,7 @@ muscles' arrays were made from, in lists of regions (offset of the pointer in mj
 from __future__ import annotations
 
 from mjwrap.kernels.musculotendon import mujoco_muscle as law
-from mjwrap.kernels.musculotendon.table import PARAMS
+from mjwrap.kernels.musculotendon.dispatch import PARAMS
 from mjwrap.mjcf.marks import COLUMN
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit

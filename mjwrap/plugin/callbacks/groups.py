@@ -5,9 +5,9 @@ from __future__ import annotations
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.coupling.groups import Paths, Poses, Routes
 from mjwrap.kernels.coupling.muscle_paths import ROUTE
+from mjwrap.kernels.musculotendon.dispatch import PARAMS
 from mjwrap.kernels.musculotendon.dynamics import TIMES
 from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart
-from mjwrap.kernels.musculotendon.table import PARAMS
 from mjwrap.kernels.solved import segments as sg
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from numba.core import types
 
-from mjwrap.kernels._types import compiled_types
+from mjwrap.kernels.array_types import compiled_types
 from mjwrap.kernels.coupling.evaluation import evaluate
 from mjwrap.kernels.coupling.groups import Paths, Poses, Routes
 from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart, Timing

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import _jit
+from mjwrap.kernels.compilation import jit
 from mjwrap.surfaces.codegen import generate, implicit, library, parametric
 from mjwrap.surfaces.codegen.differences import Array
 from mjwrap.surfaces.codegen.source import Source
@@ -99,7 +99,7 @@ def _loaded(key: str, make: Callable[[], str], label: str) -> ModuleType:
         return texts[0]
 
     module = library.load(key, make_and_keep, label)
-    if texts and not _jit.config.DISABLE_JIT:
+    if texts and not jit.config.DISABLE_JIT:
         _compare(module)
     return module
 

@@ -13,7 +13,7 @@ from typing import Any
 import numba
 from numba.core import types
 
-from mjwrap.kernels._jit import config
+from mjwrap.kernels.compilation.jit import config
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 _REAL, _POINTER = types.float64, types.CPointer(types.float64)

@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from mjwrap.kernels._jit import config
+from mjwrap.kernels.compilation.jit import config
 from mjwrap.kernels.geometry.stoermer import DOUBT, INVERSE, LANES, WEIGHT
 from mjwrap.surfaces.codegen.compiled import inner
 

@@ -24,7 +24,7 @@ from numba.core import event
 from numba.core.errors import NumbaError
 
 from mjwrap.errors import GeometryError
-from mjwrap.kernels import _folders, _places
+from mjwrap.kernels.compilation import cache_folders, module_caches
 
 PREFIX = "mjwrap_surface_"
 _IMPORTED = (
@@ -70,12 +70,12 @@ def load(key: str, make: Callable[[], str], label: str) -> ModuleType:
 @cache
 def folder() -> Path:
     """Return where modules are kept that import these sources."""
-    return _places.new_place(_IMPORTED, "mjwrap.surfaces").folder
+    return module_caches.new_place(_IMPORTED, "mjwrap.surfaces").folder
 
 
 def _write(path: Path, text: str) -> None:
     """Write a file in one go."""
-    _folders.make_version(path.parent)
+    cache_folders.make_version(path.parent)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(text)
@@ -95,8 +95,11 @@ def _import(name: str, path: Path, label: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # for good: rows of paths hold addresses of its machine code
     try:
-        _places.keep(name, path)
-        with _places.kept_in(path.parent), event.install_listener("numba:compile", _Announcer(name, label)):
+        module_caches.keep(name, path)
+        with (
+            module_caches.kept_in(path.parent),
+            event.install_listener("numba:compile", _Announcer(name, label)),
+        ):
             spec.loader.exec_module(module)
             module.TEXT = path.read_text(encoding="utf-8")  # pyright: ignore[reportAttributeAccessIssue]
     except NumbaError as error:

@@ -8,7 +8,7 @@ gets shorter.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
 from mjwrap.kernels.geometry.traits import branched
 from mjwrap.kernels.spans.cold_start import wrap_in_turn

@@ -1,17 +1,17 @@
 """The active set of a span, the obstacles that its path touches: lift-off, touchdown, contacts split and merged.
 
 "Touching or not" in docs/derivation.md. A straight segment is tested against a surface in `_penetrates`, by
-`geometry.table.dip`. A surface with hollows has two rows, as a string may touch it on both sides of a hollow that
+`geometry.dispatch.dip`. A surface with hollows has two rows, as a string may touch it on both sides of a hollow that
 it bridges ("Hollows"): the second one has a number in TOUCH.
 """
 
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.geometry.dispatch import dip, swept
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
-from mjwrap.kernels.geometry.table import dip, swept
 from mjwrap.kernels.geometry.traits import branched, hollow
 from mjwrap.kernels.geometry.winding import follow
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, SLIPPED

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon.mujoco_muscle import MINVAL
 
 INTEGRATOR, FILTER, FILTER_EXACT, MUSCLE = 0, 1, 2, 3  # dyntype

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon import degroote_fregly, millard, mujoco_muscle, path_actuator
 
 PATH_ACTUATOR = path_actuator.CODE

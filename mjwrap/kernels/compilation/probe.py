@@ -1,4 +1,4 @@
-"""Three small kernels that show whether numba links and keeps functions as `_kernel.py` takes it to."""
+"""Three small kernels that show whether numba links and keeps functions as `linking.py` takes it to."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numba.core import types
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from mjwrap.kernels import _kernel
+from mjwrap.kernels.compilation import linking
 
 
 def _multiply(x, n):
@@ -24,10 +24,10 @@ def _combine(x):
     return multiply(x, 2) + multiply(x, 3) + shift(x)
 
 
-# Names of the module, under which `_kernel.py` looks them up.
-multiply = _kernel.Apart(_multiply, _kernel.OPTIONS)
-shift = _kernel.Hidden(_shift, _kernel.OPTIONS | {"no_cpython_wrapper": True})
-combine = _kernel.Kernel(_combine, _kernel.OPTIONS)
+# Names of the module, under which `linking.py` looks them up.
+multiply = linking.Apart(_multiply, linking.OPTIONS)
+shift = linking.Hidden(_shift, linking.OPTIONS | {"no_cpython_wrapper": True})
+combine = linking.Kernel(_combine, linking.OPTIONS)
 _multiply.__qualname__ = "multiply"
 
 

@@ -1,6 +1,6 @@
-"""Whether numba is one on which `_kernel.py` can build; where it is not, kernels are plain numba functions.
+"""Whether numba is one on which `linking.py` can build; where it is not, kernels are plain numba functions.
 
-What `_kernel.py` builds on is no public part of numba. Versions that the tests ran with are taken as they are; any
+What `linking.py` builds on is no public part of numba. Versions that the tests ran with are taken as they are; any
 other has to compile, keep and load three small functions once, which takes a second. The verdict is kept on the disk.
 """
 
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numba
 
-from mjwrap.kernels import _folders
+from mjwrap.kernels.compilation import cache_folders
 
 TESTED = ("0.65", "0.66", "0.67", "0.68")  # by `benchmarks/numba_versions.py`
 _PASSED, _FAILED, _BEGUN = "passed", "failed", "begun"
@@ -33,10 +33,10 @@ def is_plain() -> bool:
         return True
     if (
         numba.__version__.startswith(tuple(f"{version}." for version in TESTED))
-        or _folders.config.DISABLE_JIT
+        or cache_folders.config.DISABLE_JIT
     ):
         return False
-    if passes(_folders.base()):
+    if passes(cache_folders.base()):
         return False
     print(_NOTICE.format(numba.__version__), file=sys.stderr, flush=True)
     return True
@@ -62,16 +62,16 @@ def _probed() -> str:
     """Return a hash over what is tried: a new version of it is tried anew."""
     import hashlib
 
-    files = [Path(__file__).with_name(name) for name in ("_kernel.py", "_probe.py")]
+    files = [Path(__file__).with_name(name) for name in ("linking.py", "probe.py")]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:8]
 
 
 def _try() -> bool:
     """Return whether the small functions find what they should; whatever goes wrong inside numba is a no."""
     try:
-        from mjwrap.kernels import _probe
+        from mjwrap.kernels.compilation import probe
 
-        return _probe.passes()
+        return probe.passes()
     except Exception:
         return False
 

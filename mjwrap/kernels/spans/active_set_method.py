@@ -6,7 +6,7 @@ active-set method: init, rounds, terminate. A round has four phases:
 1. Newton's method makes the path over the touched obstacles tangent (`_find_tangent_path`);
 2. the certificate says whether it is a local minimum of length (`certify.is_local_minimum`);
 3. lift-off and touchdown change which obstacles are touched (`_update_active_set`, `_mend_contacts`);
-4. where neither helps, a repair gives another start (`repair.repair`).
+4. where neither helps, a repair gives another start (`restarts.repair`).
 
 It ends when a certified path needs no change, or when no repair is left.
 """
@@ -16,9 +16,10 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, inlined, jit
+from mjwrap.kernels.compilation.jit import apart, inlined, jit
 from mjwrap.kernels.geometry.traits import closed_form, one_sided
-from mjwrap.kernels.spans.active_set import (
+from mjwrap.kernels.spans.cold_start import path_length, wrap_in_turn
+from mjwrap.kernels.spans.lift_off_touchdown import (
     MERGE_DISTANCE,
     MERGE_DISTANCE_ON_FAILURE,
     follow_branch,
@@ -28,8 +29,7 @@ from mjwrap.kernels.spans.active_set import (
     split_at_hollow,
     touchdown,
 )
-from mjwrap.kernels.spans.cold_start import path_length, wrap_in_turn
-from mjwrap.kernels.spans.repair import out_of_repairs, repair
+from mjwrap.kernels.spans.restarts import out_of_repairs, repair
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, save_solutions
 from mjwrap.kernels.spans.side_search import search_sides, try_other_sides
 from mjwrap.kernels.tangency.certify import is_local_minimum

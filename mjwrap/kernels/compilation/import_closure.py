@@ -16,12 +16,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = "mjwrap"
-_ROOT = Path(__file__).parents[1]
-_HOW = ("mjwrap.kernels._jit", "mjwrap.kernels._kernel")  # decide what is made of every source
-# These decide only where it is kept, or nothing that is not among the circumstances that a key is given.
+_ROOT = Path(__file__).parents[2]
+_ROOM = "mjwrap.kernels.compilation."
+_HOW = (f"{_ROOM}jit", f"{_ROOM}linking")  # they decide how every kernel is compiled
+# These decide only where machine code is kept, or what stands among the circumstances of a key anyway.
 _WHERE = {
-    f"mjwrap.kernels.{name}"
-    for name in ("_check", "_closure", "_folders", "_locator", "_places", "_probe", "_trust")
+    f"{_ROOM}{name}"
+    for name in (
+        "cache_folders",
+        "cache_locator",
+        "folder_owners",
+        "import_closure",
+        "module_caches",
+        "probe",
+        "self_test",
+    )
 }
 _STARTED = time.time()
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from numba.core import caching
 
-from mjwrap.kernels import _folders, _places
-from mjwrap.kernels._folders import config
+from mjwrap.kernels.compilation import cache_folders, module_caches
+from mjwrap.kernels.compilation.cache_folders import config
 
 
 class Locator(caching._CacheLocator):
     """Finds the place of functions of this package; leaves all others to numba."""
 
-    def __init__(self, function: Callable[..., Any], file: str, where: _places.Place) -> None:
+    def __init__(self, function: Callable[..., Any], file: str, where: module_caches.Place) -> None:
         self._py_file, self._lineno = file, function.__code__.co_firstlineno  # read by numba, too
         self._place = where
 
@@ -24,7 +24,7 @@ class Locator(caching._CacheLocator):
 
     def ensure_cache_path(self) -> None:
         """Make the folder: only now, where something is written to it."""
-        _folders.make_version(self._place.folder)
+        cache_folders.make_version(self._place.folder)
 
     def get_source_stamp(self) -> str:
         """Return what has to stand in an index file that is up to date."""
@@ -37,7 +37,7 @@ class Locator(caching._CacheLocator):
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Locator | None:
         """Return the locator of a function, None where it is not this package's."""
-        where = _places.place(py_func)
+        where = module_caches.place(py_func)
         return None if where is None else cls(py_func, py_file, where)
 
 

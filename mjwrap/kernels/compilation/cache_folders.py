@@ -17,7 +17,7 @@ from typing import Any
 
 from numba.core import config as numba_config
 
-from mjwrap.kernels import _trust
+from mjwrap.kernels.compilation import folder_owners
 
 config: Any = numba_config  # its variables, set from the environment, are not known to type checkers
 
@@ -69,11 +69,11 @@ def _candidates() -> list[Path]:
 def _is_fit(folder: Path, refused: list[tuple[Path, str]]) -> bool:
     """Return whether machine code can be kept in a folder, made where missing; add to `refused` why it must not."""
     try:
-        reason = _trust.objection(folder)  # before anything is made in a place of somebody else's
+        reason = folder_owners.objection(folder)  # before anything is made in a place of somebody else's
         if reason is None:
             make(folder)
             with tempfile.TemporaryFile(dir=folder):
-                reason = _trust.objection(folder)  # somebody else may have made it in the meantime
+                reason = folder_owners.objection(folder)  # somebody else may have made it in the meantime
     except OSError:
         return False
     if reason is not None:

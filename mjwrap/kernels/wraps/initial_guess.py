@@ -13,9 +13,9 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.geometry.dispatch import bounding_radius, height, project
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.table import bounding_radius, height, project
 from mjwrap.kernels.geometry.traits import ellipse_sections
 from mjwrap.kernels.geometry.vectors import unit
 

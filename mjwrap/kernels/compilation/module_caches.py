@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 
 import numba
 
-from mjwrap.kernels import _check, _closure, _folders
-from mjwrap.kernels._folders import config
+from mjwrap.kernels.compilation import cache_folders, import_closure, self_test
+from mjwrap.kernels.compilation.cache_folders import config
 
 
 class Place(NamedTuple):
@@ -38,7 +38,7 @@ _places: dict[str, tuple[object, Place]] = {}
 def circumstances() -> tuple[object, ...]:
     """Return what machine code depends on, but for sources."""
     bounds = os.environ.get("NUMBA_BOUNDSCHECK", "0")
-    return numba.__version__, tuple(sys.version_info[:2]), bounds, _check.is_plain()
+    return numba.__version__, tuple(sys.version_info[:2]), bounds, self_test.is_plain()
 
 
 def keep(module: str, file: Path) -> None:
@@ -50,9 +50,9 @@ def place(function: Callable[..., Any]) -> Place | None:
     """Return where the machine code of a function is kept, None where it is not this package's."""
     module, spec = function.__module__ or "", function.__globals__.get("__spec__")
     before, known = _places.get(module, (None, None))
-    if module.startswith(f"{_closure.PACKAGE}.") and (known is None or before is not spec):
+    if module.startswith(f"{import_closure.PACKAGE}.") and (known is None or before is not spec):
         if known is not None:
-            _closure.forget()
+            import_closure.forget()
         known = new_place(module)
         _places[module] = spec, known
     return known
@@ -64,12 +64,12 @@ def new_place(module: str, name: str = "") -> Place:
     name: of what is kept there, where that is not the module itself.
     """
     name = name or module
-    version = _closure.key(module, *circumstances())
+    version = import_closure.key(module, *circumstances())
     if version is None:  # edited since this process began: its code is for this process alone
         stamp = uuid.uuid4().hex[:16]
-        return Place(_folders.private() / f"{name}-{stamp}", stamp)
-    folder = _folders.base() / f"{name}-{version}"
-    _folders.use(folder)
+        return Place(cache_folders.private() / f"{name}-{stamp}", stamp)
+    folder = cache_folders.base() / f"{name}-{version}"
+    cache_folders.use(folder)
     return Place(folder, version)
 
 
@@ -80,9 +80,9 @@ def is_anything_kept() -> bool:
 
 @cache
 def _is_located() -> bool:
-    """Return whether numba asks `_locator.py`, whose base class a version to come may lack."""
+    """Return whether numba asks `cache_locator.py`, whose base class a version to come may lack."""
     try:
-        importlib.import_module("mjwrap.kernels._locator")
+        importlib.import_module("mjwrap.kernels.compilation.cache_locator")
     except (ImportError, AttributeError):
         return False
     return True

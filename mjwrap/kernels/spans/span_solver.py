@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels.compilation.jit import apart, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import closed_form
+from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
 from mjwrap.kernels.spans.end_inside import substitute_path
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
-from mjwrap.kernels.spans.span import solve_active_set
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T

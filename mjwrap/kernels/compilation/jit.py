@@ -1,4 +1,4 @@
-"""The one place that decides how kernels are compiled; `_places.py` says where the machine code is kept."""
+"""The one place that decides how kernels are compiled; `module_caches.py` says where the machine code is kept."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 import numba
 from numba.core import event
 
-from mjwrap.kernels import _check, _places
-from mjwrap.kernels._folders import config
+from mjwrap.kernels.compilation import module_caches, self_test
+from mjwrap.kernels.compilation.cache_folders import config
 
 _OURS = "mjwrap.kernels."
 F = TypeVar("F", bound=Callable[..., Any])
@@ -19,7 +19,7 @@ _FIRST, _FURTHER = (
     "about half a minute",
     "those that nothing has asked for so far; mjwrap warmup compiles all at once",
 )
-# What numba.njit has, too. Where `_kernel.py` does not fit numba, that is all there is.
+# What numba.njit has, too. Where `linking.py` does not fit numba, that is all there is.
 _PLAIN: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "cache": True}
 
 
@@ -34,7 +34,7 @@ class _Announcer(event.Listener):
         function = getattr(dispatcher, "py_func", None)
         if not self.silent and (getattr(function, "__module__", None) or "").startswith(_OURS):
             self.silent = True
-            how = _FURTHER if _places.is_anything_kept() else _FIRST
+            how = _FURTHER if module_caches.is_anything_kept() else _FIRST
             print(_NOTICE.format(how), file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
@@ -51,16 +51,16 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
     """
     if config.DISABLE_JIT:
         return function
-    if _check.is_plain():
-        with _places.kept(function):
+    if self_test.is_plain():
+        with module_caches.kept(function):
             plain: Any = numba.njit(**_PLAIN)(function)
         return plain
-    from mjwrap.kernels import _kernel  # of parts that another numba may lack
+    from mjwrap.kernels.compilation import linking  # of parts that another numba may lack
 
     if function.__name__.startswith("_"):
         kind, options = "Hidden", options | {"no_cpython_wrapper": True}
-    kernel: Any = getattr(_kernel, kind)(function, _kernel.OPTIONS | options)
-    with _places.kept(function):
+    kernel: Any = getattr(linking, kind)(function, linking.OPTIONS | options)
+    with module_caches.kept(function):
         kernel.enable_caching()
     return kernel
 

@@ -1,0 +1,1 @@
+"""How kernels are compiled and linked by numba, and where their machine code is kept on the disk."""
