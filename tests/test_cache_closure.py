@@ -222,11 +222,11 @@ def middle(x):
     return con.TWO * leaf(x)
 """
 TOP = """
-from mjwrap.kernels.compilation.jit import apart
+from mjwrap.kernels.compilation.jit import no_inline
 from mjwrap.kernels.sandbox.between import middle as mid
 
 
-@apart
+@no_inline
 def top(x):
     return mid.middle(x)
 """

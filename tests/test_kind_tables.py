@@ -57,8 +57,8 @@ def test_every_kind_has_one_class() -> None:
     assert set(EXAMPLES) == set(SURFACES) == set(shapes.SHAPES)
     assert sorted(s.kind for s in (*SURFACES, CustomSurface)) == list(range(1, lay.KINDS))
     assert [surface.numeric for surface in SURFACES] == list(SIZES)
-    assert all(kinds.known(float(kind)) for kind in range(1, lay.KINDS))
-    assert not any(kinds.known(kind) for kind in (lay.VIA, *STRANGE))
+    assert all(kinds.is_surface_kind(float(kind)) for kind in range(1, lay.KINDS))
+    assert not any(kinds.is_surface_kind(kind) for kind in (lay.VIA, *STRANGE))
 
 
 @every_surface
@@ -183,9 +183,9 @@ def test_functions_of_an_unknown_kind_give_nothing(kind: float) -> None:
     point = 0.1, 0.0, 0.01
     assert np.isnan([*kinds.project(node, 0, *point), *kinds.nearest(node, 0, *point)]).all()
     assert math.isnan(kinds.height(node, 0, *point))
-    assert math.isnan(kinds.dip(node, 0, *point, -0.1, 0.0, 0.01)[0])
-    assert math.isnan(kinds.swept(0, node))
-    assert math.isnan(kinds.straight_swept(0, node, *point, -0.1, 0.0, 0.01))
+    assert math.isnan(kinds.segment_clearance(node, 0, *point, -0.1, 0.0, 0.01)[0])
+    assert math.isnan(kinds.winding_angle(0, node))
+    assert math.isnan(kinds.segment_winding_angle(0, node, *point, -0.1, 0.0, 0.01))
 
 
 def test_a_class_of_an_unknown_kind_is_refused() -> None:
@@ -225,8 +225,8 @@ def test_muscles_over_an_unknown_kind_have_a_status() -> None:
 def test_every_code_has_one_law() -> None:
     codes = sorted(law.code for law in LAWS.values())
     assert codes == sorted((*laws.WITH_FIBER, *laws.WITHOUT_FIBER)) == list(range(len(LAWS)))
-    assert all(laws.known(code) for code in codes)
-    assert not any(laws.known(code) for code in (-1, len(LAWS), UNKNOWN_CODE))
+    assert all(laws.is_law_code(code) for code in codes)
+    assert not any(laws.is_law_code(code) for code in (-1, len(LAWS), UNKNOWN_CODE))
     assert {law.code for law in FIBER_LAWS.values()} == set(laws.WITH_FIBER)
 
 

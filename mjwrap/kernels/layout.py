@@ -63,7 +63,7 @@ CLOSED_FORM = (
 BRANCHED = 2  # the side on which a string passes is topological: S_SWEEP holds the angle that it sweeps
 HOLLOW = 4  # a straight segment that is tangent to the surface may enter it elsewhere
 ONE_SIDED = 8  # between two points there is one stable wrap at most, so that a hint or a search is needless
-DRAWN_HINTS = (
+RANDOM_STARTS = (
     16  # a cold start may throw strings over it, with hints drawn by chance at SIZE around its origin
 )
 ELLIPSE_SECTIONS = 32  # it is the sphere stretched by DIM along the axes, so that plane sections are ellipses
@@ -125,14 +125,20 @@ TOUCH = (
     116  # the row's number among the rows of its surface: 0, then 1, 2, ... where a string may touch it again
 )
 W_LAST = 117  # the saved solution before a single wrap (11)
-W_FRESH = 128  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
+W_WRAP_ERROR = 128  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
 W_BEST = 129  # the shortest solution that several cold starts have found (11)
 W_START = 140  # the saved solution from which a solve over a large move started (11)
-W_LOW = 151  # height of the lowest point of a free string over the surface [m]
-W_FIRST = 152  # in a span's first row: ||f||^2 of the contacts from which it started; -1 where they are not evaluated
-W_REPAIRS = 153  # in a span's first row: how often the path was begun anew, from another start or in strides
-W_PIN = 154  # 1 where the path ends on the surface, at Q: then h holds components of Q - B; 0 else
-W_LAND = 155  # 1 while Q is to go to that end, however far it is (`end_on_surface.py`); 0 else
+W_CLEARANCE = 151  # height of the lowest point of a free string over the surface [m]
+W_START_ERROR = 152  # in a span's first row: ||f||^2 of the contacts from which it started; -1: not evaluated
+W_RESTARTS = (
+    153  # in a span's first row: how often its solve was started anew, by a restart or by continuation
+)
+W_END_ON_SURFACE = (
+    154  # 1 where the path ends on the surface, at Q; rows 2 and 3 of h then hold Q - B; 0 else
+)
+W_END_TARGET = (
+    155  # 1 while Newton's method moves Q to that end from any distance (`end_on_surface.py`); 0 else
+)
 INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS where the string is held to the solid, alone between two fixed points; 0 else
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else

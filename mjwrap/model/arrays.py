@@ -60,10 +60,10 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
     """Return where a muscle's state comes from: source, index in act and in ctrl, limits of the control."""
     if declared.actuator < 0:
         direct = declared.parameters.states == 0
-        return (dynamics.DIRECT if direct else dynamics.OWN), 0, 0, -np.inf, np.inf
+        return (dynamics.FROM_EXCITATION if direct else dynamics.STATE_IN_MJWRAP), 0, 0, -np.inf, np.inf
     actuator = declared.actuator
     if isinstance(declared.parameters, ActuatorForce) and not int(model.actuator_ctrlnum[actuator]):
-        return dynamics.DIRECT, 0, 0, -np.inf, np.inf
+        return dynamics.FROM_EXCITATION, 0, 0, -np.inf, np.inf
     states, control = int(model.actuator_actadr[actuator]), int(model.actuator_ctrladr[actuator])
     low, high = -np.inf, np.inf
     if model.actuator_ctrllimited[control]:
@@ -73,16 +73,16 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
     else:
         kept, single = keeps_state(model, actuator), int(model.actuator_actnum[actuator]) == 1
     if kept:
-        return dynamics.KEPT, states, control, low, high
+        return dynamics.STATE_IN_ACT, states, control, low, high
     if single:
         early = bool(model.actuator_actearly[actuator]) and not isinstance(declared.parameters, ActuatorForce)
-        return dynamics.EARLY if early else dynamics.FROM_ACT, states, control, low, high
+        return dynamics.FROM_NEXT_ACT if early else dynamics.FROM_ACT, states, control, low, high
     return dynamics.FROM_CTRL, 0, control, low, high
 
 
 def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int) -> tuple[int, list[float]]:
     """Return form and constants of a muscle's activation dynamics: mjwrap's, or those of an actuator with actearly."""
-    if source != dynamics.EARLY:
+    if source != dynamics.FROM_NEXT_ACT:
         return declared.activation.form, [*declared.activation.row(), 0.0, 0.0]
     actuator = declared.actuator
     low, high = -np.inf, np.inf
@@ -146,5 +146,5 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         form=np.array([form for form, _ in activations], dtype=np.int64),
         times=np.array([row for _, row in activations], dtype=np.float64).reshape(-1, dynamics.TIMES),
         output=np.array(outputs, dtype=np.int64),
-        integrates=any(s[0] in (dynamics.OWN, dynamics.KEPT) for s in sources),
+        integrates=any(s[0] in (dynamics.STATE_IN_MJWRAP, dynamics.STATE_IN_ACT) for s in sources),
     )

@@ -323,7 +323,7 @@ LAWS: dict[str, type[Law]] = {
 
 def parameter_row(law: Law) -> tuple[float, ...]:
     """Return a law's parameters, padded to the kernels' columns; `ModelError` for a code that they do not know."""
-    if not dispatch.known(law.code):
+    if not dispatch.is_law_code(law.code):
         raise ModelError(f"{law.law}: the kernels know no law of code {law.code!r}")
     row = law.row()
     return (*row, *[0.0] * (dispatch.PARAMS - len(row)))

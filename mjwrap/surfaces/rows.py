@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
-from mjwrap.kernels.geometry.dispatch import known
+from mjwrap.kernels.geometry.dispatch import is_surface_kind
 from mjwrap.surfaces.surface import Surface
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ def traits(surface: Surface) -> int:
         + layout.BRANCHED * surface.branched
         + layout.HOLLOW * (surface.touches > 1)
         + layout.ONE_SIDED * surface.one_sided
-        + layout.DRAWN_HINTS * surface.drawn_hints
+        + layout.RANDOM_STARTS * surface.random_starts
         + layout.ELLIPSE_SECTIONS * surface.ellipse_sections
     )
 
@@ -31,7 +31,7 @@ def write_surface(surface: Surface, rows: Array) -> None:
     `GeometryError` for a kind that the kernels do not know.
     """
     name, kind, columns = type(surface).__name__, getattr(surface, "kind", None), surface.columns
-    if kind is None or not known(kind):
+    if kind is None or not is_surface_kind(kind):
         raise GeometryError(
             f"{name}: the kernels know no surface of kind {kind!r}; kinds are listed in mjwrap/kernels/layout.py"
         )

@@ -30,7 +30,7 @@ class Surface:
     branched: ClassVar[bool] = False  # which side a string passes is topological, told by a swept angle
     touches: ClassVar[int] = 1  # how often a taut string may touch it; more often than once: it has hollows
     one_sided: ClassVar[bool] = False  # two points have one stable wrap between them at most
-    drawn_hints: ClassVar[bool] = True  # a cold start may throw strings over it, with hints drawn by chance
+    random_starts: ClassVar[bool] = True  # a cold start may throw strings over it, with hints drawn by chance
     ellipse_sections: ClassVar[bool] = False  # a stretched sphere with `columns` for its semi-axes
     held_about: ClassVar[float] = (
         0.0  # ABOUT_POINT or ABOUT_AXIS: a string can be held inside it; 0: it cannot

@@ -21,7 +21,7 @@ class CustomSurface(Surface):
 
     kind: ClassVar[int] = layout.CUSTOM
     touches: ClassVar[int] = 2  # whether it has hollows is not known
-    drawn_hints: ClassVar[bool] = False  # each would cost a search by calls of its functions
+    random_starts: ClassVar[bool] = False  # each would cost a search by calls of its functions
     _made: build.Made
 
     def _set(self, made: build.Made) -> None:

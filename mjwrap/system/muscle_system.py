@@ -68,7 +68,9 @@ class MuscleSystem(Evaluator):
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
         state.applied = data.time
         state.failures += state.status != 0
-        wrenches.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
+        wrenches.add_to_xfrc(
+            data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench
+        )
 
     def advance(self, data: mujoco.MjData) -> None:
         """Bring the states that mjwrap integrates itself to the end of the step for which `apply` put its forces in.
@@ -167,10 +169,12 @@ class MuscleSystem(Evaluator):
     def _act(self, state: State, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0) -> None:
         """Evaluate at the present stage of `data`, whose kinematics are fresh, and put the wrenches in."""
         self._evaluate(state, data, data, since, ahead)
-        wrenches.put(data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench)
+        wrenches.add_to_xfrc(
+            data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench
+        )
 
     def _take_back(self, state: State, data: mujoco.MjData) -> None:
-        wrenches.take_back(data.xfrc_applied, state.others, state.mine, state.total, state.written)
+        wrenches.remove_from_xfrc(data.xfrc_applied, state.others, state.mine, state.total, state.written)
 
     def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> None:
         """Runge-Kutta: act in MuJoCo's control callback, which it calls at every stage."""

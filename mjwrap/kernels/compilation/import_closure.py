@@ -44,7 +44,7 @@ class Source(NamedTuple):
     """One file: a hash of its bytes, whether it is as old as this process at least, and what it imports."""
 
     digest: bytes
-    settled: bool
+    unchanged: bool
     imports: tuple[str, ...]
 
 
@@ -54,7 +54,7 @@ def key(module: str, *circumstances: object) -> str | None:
     None where a source was changed since this process began: what is in memory may then be older than the file.
     """
     sources = reached(module)
-    if module not in sources or not all(source.settled for source in sources.values()):
+    if module not in sources or not all(source.unchanged for source in sources.values()):
         return None
     digest = hashlib.sha256(repr(circumstances).encode())
     for name in sorted(sources):
@@ -92,8 +92,8 @@ def read(module: str) -> Source | None:
     text = content.decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
     package = module if path.endswith("__init__.py") else module.rpartition(".")[0]
     # A date in the future is that of a wrong clock, not of an edit.
-    settled = not _STARTED < changed <= time.time()
-    return Source(hashlib.sha256(content).digest(), settled, tuple(dict.fromkeys(_imports(text, package))))
+    unchanged = not _STARTED < changed <= time.time()
+    return Source(hashlib.sha256(content).digest(), unchanged, tuple(dict.fromkeys(_imports(text, package))))
 
 
 def forget() -> None:

@@ -65,9 +65,9 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
     return kernel
 
 
-def apart(function: F) -> F:
+def no_inline(function: F) -> F:
     """Compile a kernel whose code callers do not take over: a large one, to which a call is nothing."""
-    return jit(function, "Apart")
+    return jit(function, "NotInlined")
 
 
 def allocating(function: F) -> F:

@@ -58,7 +58,7 @@ class Hidden(Kernel):
         )
 
 
-class Apart(Kernel):
+class NotInlined(Kernel):
     """A compiled function whose code is not copied into its callers'."""
 
     def __init__(self, function: Any, options: dict[str, Any]) -> None:

@@ -25,7 +25,7 @@ def _combine(x):
 
 
 # Names of the module, under which `linking.py` looks them up.
-multiply = linking.Apart(_multiply, linking.OPTIONS)
+multiply = linking.NotInlined(_multiply, linking.OPTIONS)
 shift = linking.Hidden(_shift, linking.OPTIONS | {"no_cpython_wrapper": True})
 combine = linking.Kernel(_combine, linking.OPTIONS)
 _multiply.__qualname__ = "multiply"

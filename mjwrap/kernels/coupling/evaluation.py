@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from mjwrap.kernels.compilation.jit import apart
+from mjwrap.kernels.compilation.jit import no_inline
 from mjwrap.kernels.coupling.muscle_paths import measure_muscles, solve_routes
 from mjwrap.kernels.coupling.wrenches import body_wrenches
 from mjwrap.kernels.musculotendon.dynamics import drive_muscles, read_states
 
 
-@apart
+@no_inline
 def evaluate(routes, muscles, poses, inputs, timing, tol, paths, start, states, wrench):
     """Find all paths, tensions and body wrenches at the given poses; return whether some muscle has no path.
 

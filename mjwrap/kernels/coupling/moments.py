@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels.compilation.jit import jit
-from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, ends, moment
+from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, moment, segment_bodies
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
 
@@ -20,7 +20,7 @@ def add_row(c, routes, paths, dofs, row):
     weight, seg, cdof = routes.weights[c], paths.segments, dofs.cdof
     first = routes.rows[c, R_LO] + c
     for j in range(first, first + paths.count[c]):
-        near, far = ends(c, j, routes, seg[j])
+        near, far = segment_bodies(c, j, routes, seg[j])
         a, b = dofs.last_dof[near], dofs.last_dof[far]
         if a == b:
             continue

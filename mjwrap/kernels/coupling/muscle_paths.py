@@ -23,7 +23,7 @@ ROUTE = 8
 
 
 @jit
-def _place(lo, hi, links, poses, node):
+def _write_poses(lo, hi, links, poses, node):
     """Write the present poses, and at a cold start the hints, of nodes lo..hi; return whether one is cold."""
     cold = False
     for k in range(lo, hi):
@@ -75,7 +75,7 @@ def end_body(rows, links, c, index):
 
 
 @jit
-def ends(c, j, routes, row):
+def segment_bodies(c, j, routes, row):
     """Return the bodies that hold the near and the far end of segment j of route c, whose row is given."""
     near, far = j - c - 1, j - c
     if routes.rows[c, R_SURFACES] > 0:
@@ -92,7 +92,7 @@ def moment(row, column, centre):
 
 
 @jit
-def _rate(velocity, row, mx, my, mz):
+def _end_speed(velocity, row, mx, my, mz):
     """Return e . v of a body's point, about which e has the moment m; velocity: the body's row of cvel."""
     return (row[G_E] * velocity[3] + row[G_E + 1] * velocity[4] + row[G_E + 2] * velocity[5]) + (
         mx * velocity[0] + my * velocity[1] + mz * velocity[2]
@@ -100,17 +100,17 @@ def _rate(velocity, row, mx, my, mz):
 
 
 @jit
-def _rates(row, near, far, curved, poses):
+def _segment_speed(row, near, far, curved, poses):
     """Return how fast the segment in a row lengthens, whose ends two bodies hold [m/s].
 
     curved: its ends may lie on surfaces, where e need not be along a segment that vanishes.
     """
     root = poses.body_rootid[far]
     mx, my, mz = moment(row, G_B, poses.subtree_com[root])
-    rate = _rate(poses.cvel[far], row, mx, my, mz)
+    rate = _end_speed(poses.cvel[far], row, mx, my, mz)
     if curved or poses.body_rootid[near] != root:
         mx, my, mz = moment(row, G_A, poses.subtree_com[poses.body_rootid[near]])
-    return rate - _rate(poses.cvel[near], row, mx, my, mz)
+    return rate - _end_speed(poses.cvel[near], row, mx, my, mz)
 
 
 @jit
@@ -120,9 +120,9 @@ def _curved_speed(c, routes, poses, paths):
     first = routes.rows[c, R_LO] + c
     for j in range(first, first + paths.count[c]):
         row = paths.segments[j]
-        near, far = ends(c, j, routes, row)
+        near, far = segment_bodies(c, j, routes, row)
         if near != far:
-            total += _rates(row, near, far, True, poses)
+            total += _segment_speed(row, near, far, True, poses)
     return total
 
 
@@ -159,7 +159,7 @@ def _solve_straight(c, routes, poses, paths):
             paths.node[k, lay.POS + 1] = py
             paths.node[k, lay.POS + 2] = pz
         if near != far:
-            speed += _rates(row, near, far, False, poses)
+            speed += _segment_speed(row, near, far, False, poses)
         near = far
         x, y, z = px, py, pz
     good = math.isfinite(total)
@@ -183,7 +183,7 @@ def solve_routes(routes, poses, paths, tol):
             continue
         lo, hi = route[R_LO], route[R_HI]
         a, b = route[R_FROM], route[R_TO]
-        cold = _place(lo, hi, routes.links, poses, node)
+        cold = _write_poses(lo, hi, routes.links, poses, node)
         ox, oy, oz = site_xpos[a, 0], site_xpos[a, 1], site_xpos[a, 2]
         ix, iy, iz = site_xpos[b, 0], site_xpos[b, 1], site_xpos[b, 2]
         solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, True, info, c)

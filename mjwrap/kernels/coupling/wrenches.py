@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from mjwrap.kernels.compilation.jit import jit
-from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, R_SURFACES, ends, moment
+from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, R_SURFACES, moment, segment_bodies
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
 
 @jit
-def _pull(pulled, force, row, mx, my, mz):
+def _add_segment_force(pulled, force, row, mx, my, mz):
     """Add a force along e, and its moment, to a body's row."""
     pulled[0] += force * row[G_E]
     pulled[1] += force * row[G_E + 1]
@@ -38,15 +38,15 @@ def body_wrenches(routes, poses, paths, tension, wrench):
         curved = route[R_SURFACES] > 0
         for j in range(first, first + paths.count[c]):
             row = paths.segments[j]
-            near, far = ends(c, j, routes, row)
+            near, far = segment_bodies(c, j, routes, row)
             if near == far:
                 continue
             root = body_rootid[far]
             mx, my, mz = moment(row, G_B, subtree_com[root])
-            _pull(wrench[far], -force, row, mx, my, mz)
+            _add_segment_force(wrench[far], -force, row, mx, my, mz)
             if curved or body_rootid[near] != root:
                 mx, my, mz = moment(row, G_A, subtree_com[body_rootid[near]])
-            _pull(wrench[near], force, row, mx, my, mz)
+            _add_segment_force(wrench[near], force, row, mx, my, mz)
     for b in range(wrench.shape[0]):
         pulled, centre, own = wrench[b], subtree_com[body_rootid[b]], poses.xipos[b]
         fx, fy, fz = pulled[0], pulled[1], pulled[2]
@@ -60,7 +60,7 @@ def body_wrenches(routes, poses, paths, tension, wrench):
 
 
 @jit
-def take_back(xfrc, others, mine, total, written):
+def remove_from_xfrc(xfrc, others, mine, total, written):
     """Leave in xfrc_applied (nbody, 6) what others put there.
 
     Rows still as mjwrap wrote them get others' share back to the bit. Where a row was set to zero since then (a reset,
@@ -95,9 +95,9 @@ def take_back(xfrc, others, mine, total, written):
 
 
 @jit
-def put(xfrc, others, mine, total, written, wrench):
+def add_to_xfrc(xfrc, others, mine, total, written, wrench):
     """Take the last contribution back and add the new wrench (nbody, 6) to xfrc_applied."""
-    take_back(xfrc, others, mine, total, written)
+    remove_from_xfrc(xfrc, others, mine, total, written)
     for b in range(xfrc.shape[0]):
         loaded = False
         for i in range(6):

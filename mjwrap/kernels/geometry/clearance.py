@@ -35,10 +35,10 @@ def lowest_over_axis(half, ax, ay, az, dx, dy, dz):
         return 0.0
     flat = dx * dx + dy * dy
     share = clamp(-(ax * dx + ay * dy) / flat) if flat > 0.0 else 0.0
-    foot = az + share * dz
-    if abs(foot) > half:
-        foot = min(max(foot, -half), half)
-        share = clamp(-(ax * dx + ay * dy + (az - foot) * dz) / square)
+    nearest_z = az + share * dz
+    if abs(nearest_z) > half:
+        nearest_z = min(max(nearest_z, -half), half)
+        share = clamp(-(ax * dx + ay * dy + (az - nearest_z) * dz) / square)
     return share
 
 
@@ -75,13 +75,13 @@ def tube_angle(major, x, y, z):
 
 
 @jit
-def bounded_part(reach, ax, ay, az, dx, dy, dz):
-    """Return the shares of the segment between which it is inside the sphere of radius `reach` about the origin."""
+def bounded_part(radius, ax, ay, az, dx, dy, dz):
+    """Return the shares of the segment between which it is inside a sphere about the origin; radius in [m]."""
     square = dx * dx + dy * dy + dz * dz
-    if not (reach < math.inf and square > 0.0):
+    if not (radius < math.inf and square > 0.0):
         return 0.0, 1.0
     middle = -(ax * dx + ay * dy + az * dz) / square
-    gap = reach * reach - ((ax + middle * dx) ** 2 + (ay + middle * dy) ** 2 + (az + middle * dz) ** 2)
+    gap = radius * radius - ((ax + middle * dx) ** 2 + (ay + middle * dy) ** 2 + (az + middle * dz) ** 2)
     half = math.sqrt(max(gap, 0.0) / square)
     return clamp(middle - half), clamp(middle + half)
 

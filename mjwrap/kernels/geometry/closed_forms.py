@@ -135,7 +135,7 @@ def capsule(k, node):
     tx, ty, tz = sign * tx, sign * ty, sign * tz
     a, da, r, dr = 1.0, 0.0, 0.0, 1.0
     gone, least = 0.0, 1.0
-    straightest = node[k, W_KP]
+    least_curvature = node[k, W_KP]
     for _ in range(64):
         on_cap = abs(z) > half or (abs(z) == half and z * tz > 0.0)
         if not on_cap:
@@ -150,7 +150,7 @@ def capsule(k, node):
             nx, ny, tx, ty = c * nx - d * ny, d * nx + c * ny, c * tx - d * ty, d * tx + c * ty
             z = math.copysign(half, tz) if h < left else z + h * tz
             a, r = a + h * da, r + h * dr
-            straightest = min(straightest, around * around * inverse)
+            least_curvature = min(least_curvature, around * around * inverse)
         else:
             side = math.copysign(1.0, z)
             h = left
@@ -170,7 +170,7 @@ def capsule(k, node):
                 nx, ny, nz, z = nx * over, ny * over, 0.0, side * half
             a, da = c * a + radius * d * da, -d * inverse * a + c * da
             r, dr = c * r + radius * d * dr, -d * inverse * r + c * dr
-            straightest = min(straightest, inverse)
+            least_curvature = min(least_curvature, inverse)
         left -= h
         gone += h
         if gone > 0.0:
@@ -184,7 +184,7 @@ def capsule(k, node):
         nz = 0.0
     put_end(node, k, radius * nx, radius * ny, z, tx, ty, tz, nx, ny, nz)
     _put_capsule(node, k, W_KQ, half, inverse, z, nx, ny, nz, tx, ty, tz)
-    put_fields(node, k, a, sign * da, sign * r, dr, straightest, least)
+    put_fields(node, k, a, sign * da, sign * r, dr, least_curvature, least)
 
 
 @jit

@@ -39,25 +39,27 @@ from mjwrap.kernels.geometry.torus import torus
 from mjwrap.kernels.geometry.user_surface import custom_geodesic, custom_height, custom_project
 from mjwrap.kernels.geometry.vectors import put_end, put_start
 from mjwrap.kernels.geometry.winding import (
-    straight_about_tube,
-    swept_about_axis,
-    swept_about_cylinder,
-    swept_about_tube,
+    segment_winding_about_tube,
+    winding_about_axis,
+    winding_about_cylinder,
+    winding_about_tube,
 )
 
 KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
 NAN = math.nan
 
-SPACING = 0.4  # of the smallest radius of curvature: between samples of a surface that is not convex
-MOST_SAMPLES = 200
-DEEP, LOCATED = 1e-3, 1e-3  # a dip that is so deep is located to so much, both in the surface's size
-REFINEMENTS = 25  # of a dip between samples, by the golden section
-EDGE = 1e-3  # of the spacing: how near to the ends of a segment a dip is looked for
+# `_lowest_by_samples`, for surfaces that are not convex; lengths are shares of the surface's size.
+SAMPLE_SPACING = 0.4  # distance between two samples of the height along the segment
+MAX_SAMPLES = 200  # most samples of one segment
+DEEP_ENTRY = 1e-3  # a segment that enters deeper than this has its lowest point located less exactly, ...
+DEEP_ENTRY_WIDTH = 1e-3  # ... to this length
+REFINEMENTS = 25  # most golden-section steps to a lowest point between samples
+END_PROBE = 1e-3  # distance of the extra samples at the segment's ends, as a share of the sample spacing
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 @jit
-def known(kind):
+def is_surface_kind(kind):
     """Return whether a kind is that of a surface in the functions below."""
     return lay.VIA < kind < lay.KINDS and kind == math.floor(kind)
 
@@ -164,7 +166,7 @@ def bounding_radius(node, k):
 
 
 @jit
-def dip(node, k, ax, ay, az, bx, by, bz):
+def segment_clearance(node, k, ax, ay, az, bx, by, bz):
     """Return the height of the lowest point of the segment from A to B over obstacle k, and its share of the way.
 
     In closed form for some convex kinds, else by samples of the height.
@@ -202,7 +204,7 @@ def _height_at(node, k, share, ax, ay, az, dx, dy, dz):
 def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
     """Return the lowest point's share between two shares, from samples at the scale of the curvature, refined."""
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
-    count = int(min(math.ceil((last - first) * size / (SPACING * node[k, SIZE])), MOST_SAMPLES)) + 1
+    count = int(min(math.ceil((last - first) * size / (SAMPLE_SPACING * node[k, SIZE])), MAX_SAMPLES)) + 1
     step = (last - first) / count
     best, lowest = first, _height_at(node, k, first, ax, ay, az, dx, dy, dz)
     before, here = lowest, lowest
@@ -213,21 +215,22 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
             after = _height_at(node, k, share, ax, ay, az, dx, dy, dz)
         if after < lowest:
             best, lowest = share, after
-        beside = (
+        near_an_end = (
             i == 1
             and after > here
-            and _height_at(node, k, first + EDGE * step, ax, ay, az, dx, dy, dz) < here
+            and _height_at(node, k, first + END_PROBE * step, ax, ay, az, dx, dy, dz) < here
         )
         if i > count and before > here:
-            beside = _height_at(node, k, last - EDGE * step, ax, ay, az, dx, dy, dz) < here
+            near_an_end = _height_at(node, k, last - END_PROBE * step, ax, ay, az, dx, dy, dz) < here
         inner = 1 < i <= count and here <= before and here <= after
-        if beside or (inner and here < lowest + step * size):
+        if near_an_end or (inner and here < lowest + step * size):
             lo, hi = max(share - 2.0 * step, first), min(share, last)
             one, two = hi - GOLDEN * (hi - lo), lo + GOLDEN * (hi - lo)
             h_one = _height_at(node, k, one, ax, ay, az, dx, dy, dz)
             h_two = _height_at(node, k, two, ax, ay, az, dx, dy, dz)
             for _ in range(REFINEMENTS):
-                if min(h_one, h_two) < -DEEP * node[k, SIZE] and (hi - lo) * size < LOCATED * node[k, SIZE]:
+                deep = min(h_one, h_two) < -DEEP_ENTRY * node[k, SIZE]
+                if deep and (hi - lo) * size < DEEP_ENTRY_WIDTH * node[k, SIZE]:
                     break
                 if h_one < h_two:
                     hi, two, h_two = two, one, h_one
@@ -247,7 +250,7 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
 
 
 @jit
-def swept(k, node):
+def winding_angle(k, node):
     """Return the angle that the path of the last evaluation sweeps, with sign [rad].
 
     About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the
@@ -255,22 +258,22 @@ def swept(k, node):
     """
     kind = node[k, KIND]
     if kind == lay.CYLINDER:
-        return swept_about_cylinder(k, node)
+        return winding_about_cylinder(k, node)
     if kind == lay.TORUS:
-        return swept_about_tube(k, node)
+        return winding_about_tube(k, node)
     if kind == lay.ELLIPTIC_CYLINDER:
-        return swept_about_axis(k, node, 1.0 / node[k, DIM], 1.0 / node[k, DIM + 1])
+        return winding_about_axis(k, node, 1.0 / node[k, DIM], 1.0 / node[k, DIM + 1])
     if kind == lay.CONE:
-        return swept_about_axis(k, node, 1.0, 1.0)
+        return winding_about_axis(k, node, 1.0, 1.0)
     return NAN
 
 
 @jit
-def straight_swept(k, node, ax, ay, az, bx, by, bz):
+def segment_winding_angle(k, node, ax, ay, az, bx, by, bz):
     """Return the angle that the straight segment from A to B sweeps about obstacle k [rad].
 
     Asked of kinds whose side is topological and whose wraps are searched for; NaN for others.
     """
     if node[k, KIND] == lay.TORUS:
-        return straight_about_tube(node[k, DIM], ax, ay, az, bx, by, bz)
+        return segment_winding_about_tube(node[k, DIM], ax, ay, az, bx, by, bz)
     return NAN

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, jit
+from mjwrap.kernels.compilation.jit import jit, no_inline
 from mjwrap.kernels.geometry.dispatch import evaluate_geodesic, project
 from mjwrap.kernels.geometry.vectors import cross
 
@@ -15,7 +15,7 @@ POS = lay.POS
 S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
 
 
-@apart
+@no_inline
 def geodesic(k, node, base_x, base_y, base_z):
     """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row.
 

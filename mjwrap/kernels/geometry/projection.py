@@ -91,12 +91,13 @@ def project_cone(radius, slope, x, y, z):
         cu, su = x / rho, y / rho
     square = 1.0 / (1.0 + slope * slope)
     over = math.sqrt(square)
-    foot = (z + slope * (rho - radius)) * square  # z of the nearest point of the line rho = radius + slope z
-    reach = radius + slope * foot
+    # the nearest point of the line rho = radius + slope z
+    nearest_z = (z + slope * (rho - radius)) * square
+    nearest_rho = radius + slope * nearest_z
     least = 1e-9 * radius
-    if reach < least:
-        reach, foot = least, (least - radius) / slope
-    return reach * cu, reach * su, foot, over * cu, over * su, -slope * over
+    if nearest_rho < least:
+        nearest_rho, nearest_z = least, (least - radius) / slope
+    return nearest_rho * cu, nearest_rho * su, nearest_z, over * cu, over * su, -slope * over
 
 
 @jit
@@ -143,9 +144,9 @@ def height_over_torus(major, minor, x, y, z):
 @jit
 def height_over_cone(radius, slope, x, y, z):
     """Return the distance from a cone's nappe, as if it went on beyond the apex [m]."""
-    reach = radius + slope * z
+    cone_radius = radius + slope * z
     rho = math.sqrt(x * x + y * y)
-    return (rho - reach) / math.sqrt(1.0 + slope * slope)
+    return (rho - cone_radius) / math.sqrt(1.0 + slope * slope)
 
 
 @jit

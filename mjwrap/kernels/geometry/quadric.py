@@ -14,14 +14,14 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.geometry.stoermer import (
-    DOUBT,
+    ERROR_WEIGHT,
     INVERSE,
     INVERSE_SQUARE,
     LANES,
     MAX_STEPS,
-    RATE,
+    RATE_WEIGHT,
     ROWS,
-    SHRINK,
+    SHRINK_EXPONENT,
     TOLERANCE,
     WEIGHT,
     carray,
@@ -141,14 +141,15 @@ def _step(h, rate, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic):
         v[8, i] -= size * (d * v[3, i])
         v[9, i] -= size * (d * v[4, i])
     over = 1.0 / h
-    doubt = max(abs(combine(v, 0, DOUBT)) / ia, abs(combine(v, 1, DOUBT)) / ib)
+    error = max(abs(combine(v, 0, ERROR_WEIGHT)) / ia, abs(combine(v, 1, ERROR_WEIGHT)) / ib)
     if ic != 0.0:
-        doubt = max(doubt, abs(combine(v, 2, DOUBT)) / ic)
-    doubt = max(max(doubt, abs(combine(v, 4, DOUBT))) * rate, abs(combine(v, 3, DOUBT)))
+        error = max(error, abs(combine(v, 2, ERROR_WEIGHT)) / ic)
+    error = max(max(error, abs(combine(v, 4, ERROR_WEIGHT))) * rate, abs(combine(v, 3, ERROR_WEIGHT)))
     return (
-        doubt, combine(v, 0, WEIGHT), combine(v, 1, WEIGHT), combine(v, 2, WEIGHT),
-        combine(v, 5, RATE) * over, combine(v, 6, RATE) * over, combine(v, 7, RATE) * over,
-        combine(v, 3, WEIGHT), combine(v, 8, RATE) * over, combine(v, 4, WEIGHT), combine(v, 9, RATE) * over,
+        error, combine(v, 0, WEIGHT), combine(v, 1, WEIGHT), combine(v, 2, WEIGHT),
+        combine(v, 5, RATE_WEIGHT) * over, combine(v, 6, RATE_WEIGHT) * over, combine(v, 7, RATE_WEIGHT) * over,
+        combine(v, 3, WEIGHT), combine(v, 8, RATE_WEIGHT) * over,
+        combine(v, 4, WEIGHT), combine(v, 9, RATE_WEIGHT) * over,
     )  # fmt: skip
 
 
@@ -198,11 +199,11 @@ def quadric(k, node):
             h = left
         else:
             h = left / math.ceil(abs(left) / h)
-        doubt, px, py, pz, vx, vy, vz, f, df, g, dg = _step(
+        error, px, py, pz, vx, vy, vz, f, df, g, dg = _step(
             h, rate, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic
         )
-        if not doubt <= TOLERANCE:
-            longest = abs(h) * min(max((0.1 * TOLERANCE / doubt) ** SHRINK, 0.2), 0.9)
+        if not error <= TOLERANCE:
+            longest = abs(h) * min(max((0.1 * TOLERANCE / error) ** SHRINK_EXPONENT, 0.2), 0.9)
             continue
         gx, gy, gz, ux, uy, uz, a, da, r, dr = px, py, pz, vx, vy, vz, f, df, g, dg
         gone += h

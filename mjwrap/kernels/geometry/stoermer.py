@@ -35,11 +35,11 @@ def _weights(n: Any) -> Any:
 INVERSE = 1.0 / _N  # of the number of substeps
 INVERSE_SQUARE = 1.0 / (_N * _N)
 WEIGHT = _weights(_N)
-RATE = WEIGHT * _N  # for the differences, which are 1/n of h times the rate
-DOUBT = WEIGHT - np.append(_weights(_N[:-1]), 0.0)  # weights of the error estimate
+RATE_WEIGHT = WEIGHT * _N  # for the differences, which are 1/n of h times the rate
+ERROR_WEIGHT = WEIGHT - np.append(_weights(_N[:-1]), 0.0)  # weights of the error estimate
 
 TOLERANCE = 1e-11  # of the estimate: the error of a step is then below 1e-12, mostly 1e-14 (docs/accuracy.md)
-SHRINK = 1.0 / 15.0  # power by which a rejected step shrinks
+SHRINK_EXPONENT = 1.0 / 15.0  # power by which a rejected step shrinks
 MAX_STEPS = 200  # of one geodesic, rejected ones included
 
 

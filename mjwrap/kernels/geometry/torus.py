@@ -13,12 +13,12 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.geometry.stoermer import (
-    DOUBT,
+    ERROR_WEIGHT,
     INVERSE,
     LANES,
     MAX_STEPS,
     ROWS,
-    SHRINK,
+    SHRINK_EXPONENT,
     TOLERANCE,
     WEIGHT,
     carray,
@@ -96,15 +96,15 @@ def _step(h, p, z, dp, dz, a, da, r, dr, major, ir, c2):
         sz += weight * v[1, i]
         sa += weight * v[2, i]
         sr += weight * v[3, i]
-        u = DOUBT[i]
+        u = ERROR_WEIGHT[i]
         ep += u * v[0, i]
         ez += u * v[1, i]
         ea += u * v[2, i]
         er += u * v[3, i]
     over = 1.0 / h
-    doubt = max(max(abs(ep), abs(ez)), abs(er)) * abs(over)
+    error = max(max(abs(ep), abs(ez)), abs(er)) * abs(over)
     return (
-        max(doubt, abs(ea)), p + sp, z + sz, vp * over, vz * over, a + sa, va * over, r + sr, vr * over, h * su,
+        max(error, abs(ea)), p + sp, z + sz, vp * over, vz * over, a + sa, va * over, r + sr, vr * over, h * su,
     )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ def torus(k, node):
     dp, dz = -sv * along, cv * along
     left, gone, angle = node[k, S_ARC], 0.0, 0.0
     a, da, r, dr = 1.0, 0.0, 0.0, 1.0
-    least, straightest = 1.0, node[k, lay.W_KP]
+    least, least_curvature = 1.0, node[k, lay.W_KP]
     longest = 1e300
     turns = 0.0
     for _ in range(MAX_STEPS):
@@ -140,18 +140,18 @@ def torus(k, node):
             h = left
         else:
             h = left / math.ceil(abs(left) / h)
-        doubt, p1, z1, dp1, dz1, a1, da1, r1, dr1, part = _step(
+        error, p1, z1, dp1, dz1, a1, da1, r1, dr1, part = _step(
             h, rho, z, dp, dz, a, da, r, dr, major, ir, c2
         )
-        if not doubt <= TOLERANCE:
-            longest = abs(h) * min(max((0.1 * TOLERANCE / doubt) ** SHRINK, 0.2), 0.9)
+        if not error <= TOLERANCE:
+            longest = abs(h) * min(max((0.1 * TOLERANCE / error) ** SHRINK_EXPONENT, 0.2), 0.9)
             continue
         if (z >= 0.0) != (z1 >= 0.0) and rho + p1 < 2.0 * major:
             turns += 1.0 if (z >= 0.0) == (left > 0.0) else -1.0
         if h * dp < 0.0 < h * dp1:
             # nearest to the axis in between: in the hole's circle, or where it turns back before (c)
             nearest = max(major - minor, abs(c))
-            straightest = min(straightest, (1.0 - c2 * major / nearest**3) * ir)
+            least_curvature = min(least_curvature, (1.0 - c2 * major / nearest**3) * ir)
         rho, z, dp, dz, a, da, r, dr = p1, z1, dp1, dz1, a1, da1, r1, dr1
         angle += part
         gone += h
@@ -160,7 +160,7 @@ def torus(k, node):
         left = 0.0 if h == left else left - h
         w = 1.0 / rho
         q = c2 * w * w
-        straightest = min(straightest, (1.0 - q) * ir + q * w * (rho - major) * ir)
+        least_curvature = min(least_curvature, (1.0 - q) * ir + q * w * (rho - major) * ir)
     cv, sv = (rho - major) * ir, z * ir
     over = 1.0 / math.sqrt(cv * cv + sv * sv)
     cv, sv = cv * over, sv * over
@@ -177,7 +177,7 @@ def torus(k, node):
     )  # fmt: skip
     _put_curvature(node, k, lay.W_KQ, around, along, cv, ir, rho)
     node[k, lay.W_ANGLE] = turns
-    put_fields(node, k, a, da, r, dr, straightest, least)
+    put_fields(node, k, a, da, r, dr, least_curvature, least)
 
 
 @jit

@@ -36,9 +36,9 @@ def one_sided(k, node):
 
 
 @jit
-def drawn_hints(k, node):
+def random_starts(k, node):
     """Return whether a cold start may throw strings over the surface, with hints drawn by chance."""
-    return int(node[k, TRAITS]) & lay.DRAWN_HINTS != 0
+    return int(node[k, TRAITS]) & lay.RANDOM_STARTS != 0
 
 
 @jit

@@ -28,7 +28,7 @@ def nearest_turn(angle, reference):
 
 
 @jit
-def follow(angle, before):
+def unwrap_angle(angle, before):
     """Return the swept angle that equals `angle` modulo 2 pi and continues `before` [rad].
 
     A string winds beyond one turn only in small steps: after a large jump nobody can tell, and the way within one turn
@@ -50,7 +50,7 @@ def tangents_sweep(root_a, root_b, radius):
 
 
 @jit
-def swept_about_cylinder(k, node):
+def winding_about_cylinder(k, node):
     """Return the angle that the path of the last evaluation sweeps about a cylinder's axis, with sign [rad]."""
     inverse = 1.0 / node[k, DIM]
     t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
@@ -60,7 +60,7 @@ def swept_about_cylinder(k, node):
 
 
 @jit
-def _corners(k, node):
+def _points_of_path(k, node):
     """Return A, P, Q and B of the last evaluation in the frame S: where the path comes from, touches, and goes."""
     px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
     size = -node[k, W_L]
@@ -83,9 +83,9 @@ def _corners(k, node):
 
 
 @jit
-def swept_about_tube(k, node):
+def winding_about_tube(k, node):
     """Return the angle that the path of the last evaluation sweeps about the middle of a torus' tube [rad]."""
-    ax, ay, az, px, py, pz, qx, qy, qz, bx, by, bz = _corners(k, node)
+    ax, ay, az, px, py, pz, qx, qy, qz, bx, by, bz = _points_of_path(k, node)
     major = node[k, DIM]
     turns = tube_crossing(major, ax, ay, az, px, py, pz) + tube_crossing(major, qx, qy, qz, bx, by, bz)
     return (
@@ -96,19 +96,19 @@ def swept_about_tube(k, node):
 
 
 @jit
-def straight_about_tube(major, ax, ay, az, bx, by, bz):
+def segment_winding_about_tube(major, ax, ay, az, bx, by, bz):
     """Return the angle that the straight segment from A to B sweeps about the middle of a torus' tube [rad]."""
     turns = tube_crossing(major, ax, ay, az, bx, by, bz)
     return tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az) + 2.0 * math.pi * turns
 
 
 @jit
-def swept_about_axis(k, node, ia, ib):
+def winding_about_axis(k, node, ia, ib):
     """Return the angle about z that the path of the last evaluation sweeps, x scaled by ia and y by ib [rad].
 
     The geodesic's own share is W_ANGLE, in the same image.
     """
-    ax, ay, _, px, py, _, qx, qy, _, bx, by, _ = _corners(k, node)
+    ax, ay, _, px, py, _, qx, qy, _, bx, by, _ = _points_of_path(k, node)
     ax, ay, px, py, qx, qy, bx, by = ia * ax, ib * ay, ia * px, ib * py, ia * qx, ib * qy, ia * bx, ib * by
     return (
         math.atan2(ax * py - ay * px, ax * px + ay * py)

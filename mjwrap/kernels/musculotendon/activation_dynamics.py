@@ -19,7 +19,7 @@ NODES = tuple(float(0.5 + 0.5 * x) for x in np.polynomial.legendre.leggauss(8)[0
 WEIGHTS = tuple(float(0.5 * w) for w in np.polynomial.legendre.leggauss(8)[1])
 PANEL = 0.5  # of ln |u - a|: the quadrature's error there is about 1e-13 of the time
 PANELS = 80  # in as many |u - a| falls to below 1e-17 of what it was
-MOST = 20  # Newton steps in the last panel; two or three are normal
+MAX_STEPS = 20  # Newton steps in the last panel; two or three are normal
 
 
 @jit
@@ -128,7 +128,7 @@ def advance_smooth(a, u, activation_time, deactivation_time, smoothing, duration
         pace = _time_per_fall(w, u, rises, activation_time, deactivation_time, smoothing)
         fall = min(left / pace, PANEL)
         last = True
-        for _ in range(MOST):
+        for _ in range(MAX_STEPS):
             time = 0.0
             for k in range(len(NODES)):
                 at = w * math.exp(-fall * NODES[k])

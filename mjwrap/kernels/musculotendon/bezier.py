@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels.compilation.jit import jit
 
-CLOSE = 1e-9  # last Newton step where the slope is far from zero
+LAST_STEP = 1e-9  # last Newton step where the slope is far from zero
 ROUNDING = 1e-16
-MOST = 80  # Newton steps and bisections in an inversion; two steps are normal
+MAX_STEPS = 80  # Newton steps and bisections in an inversion; two steps are normal
 DEGREE = 9  # of a piece's value; its slope's is one less
 NARROWEST = 2.0**-10  # piece, in widths of its corner
 CELLS = 2048  # equal parts of a curve
 # Error of a piece's slope, relative to itself and to the steepest of its corner.
-SAME, STEEPEST = 1e-11, 5e-15
+RELATIVE_TOL, SLOPE_TOL = 1e-11, 5e-15
 
 Corner = tuple[float, float, float, float, float, float]  # x0, y0, slope at 0, x1, y1, slope at 1
 Array = NDArray[np.float64]
@@ -99,8 +99,8 @@ def _pieces(curve: Array) -> Array:
         value, slope = _curve(curve[which, None], middle[:, None] + half * spots)
         there = slope[:, 1 + DEGREE :]
         rising = slope[:, 1 : 1 + DEGREE] @ fit  # coefficients of the slope
-        off = np.abs(rising @ powers - there) - SAME * np.abs(there)
-        good = (off <= STEEPEST * steepest[which, None]).all(axis=1) | (half <= NARROWEST)
+        off = np.abs(rising @ powers - there) - RELATIVE_TOL * np.abs(there)
+        good = (off <= SLOPE_TOL * steepest[which, None]).all(axis=1) | (half <= NARROWEST)
         width = half * curve[which, DX]
         rising *= width[:, None] / np.arange(1, DEGREE + 1)
         x = curve[which, X0] + middle * curve[which, DX]
@@ -127,12 +127,12 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
     _, dx, xq, xr, y0, dy, yq, yr, _, _ = np.moveaxis(corner, -1, 0)
     part = np.clip(part, 0.0, 1.0)
     low, high, u = np.zeros_like(part), np.ones_like(part), part
-    for _ in range(MOST):
+    for _ in range(MAX_STEPS):
         value, slope = coordinate(xq, xr, u)
         low, high = np.where(value < part, u, low), np.where(value < part, high, u)
         new = u + (part - value) / slope
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-        last = np.abs(new - u).max() <= CLOSE
+        last = np.abs(new - u).max() <= LAST_STEP
         u = new
         if last:
             break
@@ -147,7 +147,7 @@ def invert(q, r, wanted, start, enough):
     The last step is at most `enough`; where the slope is not zero the error left is its square.
     """
     low, high, u = 0.0, 1.0, start
-    for _ in range(MOST):
+    for _ in range(MAX_STEPS):
         value, slope = blend(q, r, u)
         miss = wanted - value
         if miss > 0.0:
@@ -236,7 +236,7 @@ def integral(curve, x):
         wanted = (x - curve[i, X0]) / curve[i, DX]
         if wanted < 1.0:
             return total + corner_integral(
-                curve, i, invert(curve[i, XQ], curve[i, XR], wanted, wanted, CLOSE)
+                curve, i, invert(curve[i, XQ], curve[i, XR], wanted, wanted, LAST_STEP)
             )
         total += corner_integral(curve, i, 1.0)
     last = curve.shape[0] - 1

@@ -18,9 +18,9 @@ PASSIVE_OFFSET = math.exp(PASSIVE_STIFFNESS * (LEAST - 1.0))
 PASSIVE_SCALE = math.exp(4.0) - PASSIVE_OFFSET
 D1, D2, D3, D4 = -0.3211346127989808, -8.149, -0.374, 0.8825327733249912
 TENDON_STIFFNESS = math.log(6.0) / 0.049
-HIGHEST = 100.0  # exponent from which an exponential goes on straight, so that no force is infinite
-WIDEST = 8.0  # |asinh| of the force-velocity curve's argument at 180 v_max: faster is not looked for
-MOST = 60  # Newton steps; three or four are normal
+LARGEST_EXPONENT = 100.0  # exponent from which an exponential goes on straight, so that no force is infinite
+LARGEST_ASINH = 8.0  # |asinh| of the force-velocity curve's argument at 180 v_max: faster is not looked for
+MAX_STEPS = 60  # Newton steps; three or four are normal
 
 
 @jit
@@ -46,7 +46,7 @@ def active(x):
 @jit
 def _exponential(z):
     """Return exp(z) and its slope."""
-    low = min(z, HIGHEST)
+    low = min(z, LARGEST_EXPONENT)
     slope = math.exp(low)
     return slope * (1.0 + (z - low)), slope
 
@@ -82,19 +82,19 @@ def balancing_velocity(strength, damping, wanted, close):
     a, b = -D1 * strength, -damping / D2
     c = strength * D4 + b * D3 - wanted
     size = abs(c)
-    y = min(size / (a + b), WIDEST)
+    y = min(size / (a + b), LARGEST_ASINH)
     if y > 1.0 and b > 0.0:
         y = min(y, math.log(size / b + math.sqrt(size / b * (size / b) + 1.0)))
     sinh = cosh = step = 0.0
-    for _ in range(MOST):
+    for _ in range(MAX_STEPS):
         grown = math.exp(y)
         shrunk = 1.0 / grown
         sinh, cosh = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
         step = (size - a * y - b * sinh) / (a + b * cosh)
-        if abs(step) <= close or y + step >= WIDEST:
+        if abs(step) <= close or y + step >= LARGEST_ASINH:
             break
         y += step
-    y = min(y + step, WIDEST)
+    y = min(y + step, LARGEST_ASINH)
     if abs(step) > 1e-5:
         grown = math.exp(y)
         sinh, cosh = 0.5 * (grown - 1.0 / grown), 0.5 * (grown + 1.0 / grown)

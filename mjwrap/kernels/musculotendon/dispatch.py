@@ -28,7 +28,7 @@ NAN = math.nan
 
 
 @jit
-def known(law):
+def is_law_code(law):
     """Return whether a code is that of a law."""
     return law in WITH_FIBER or law in WITHOUT_FIBER
 

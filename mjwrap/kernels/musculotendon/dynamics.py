@@ -1,8 +1,8 @@
 """From excitations, states and path lengths to tensions and the states at the end of a step, for all muscles.
 
 A muscle's state is its activation and, where its tendon is elastic, its fibre length [m]. MuJoCo integrates the
-activations of its own muscles; what mjwrap integrates lies in two entries of `act` (KEPT), where MuJoCo saves and
-restores it, or, for muscles without an actuator, in an array of mjwrap's (OWN).
+activations of its own muscles. States that mjwrap integrates stand in two entries of `act` (STATE_IN_ACT), which MuJoCo
+saves and restores, or, for muscles without an actuator, in an array of mjwrap's own (STATE_IN_MJWRAP).
 """
 
 from __future__ import annotations
@@ -24,25 +24,36 @@ from mjwrap.kernels.musculotendon.fiber import (
 )
 from mjwrap.kernels.musculotendon.tension import tension as law_tension
 
-# where a muscle's state comes from
-FROM_ACT, FROM_CTRL, OWN, DIRECT, KEPT, EARLY = 0, 1, 2, 3, 4, 5
-TIMES = 5  # columns of `times`: two time constants [s] and smoothness; EARLY: see `early.next_activation`
-NO_FIBER = 0.0  # stands where no fibre length is known: the muscle starts at static equilibrium
+# Where a muscle's activation comes from, and its fibre length, if mjwrap integrates them.
+FROM_ACT = 0  # activation: MuJoCo's `act`
+FROM_CTRL = 1  # activation: the control
+STATE_IN_MJWRAP = 2  # activation and fibre length: integrated by mjwrap, in its own array; no actuator
+FROM_EXCITATION = 3  # activation: the excitation; no actuator
+STATE_IN_ACT = 4  # activation and fibre length: integrated by mjwrap, in two entries of `act`
+FROM_NEXT_ACT = 5  # activation: `act` at the end of the step, for actuators with `actearly`
+TIMES = 5  # columns of `times`: two time constants [s] and smoothness; for FROM_NEXT_ACT see `actearly.next_activation`
+NO_FIBER = 0.0  # a fibre length that is not known: the muscle starts at static equilibrium
 
 
 @jit
 def read_states(muscles, inputs, timing, start):
     """Write activation, fibre length [m] and excitation of every muscle at the step's start into `start`.
 
-    What mjwrap integrates is read at the start only: a later stage of Runge-Kutta goes on from there.
-    Activations: FROM_ACT act[index]; EARLY what that will be a timestep later; FROM_CTRL the drive; DIRECT the
-    drive; OWN own[m, 0]; KEPT act[index], with the fibre length beside it. The drive is the excitation for OWN and
-    DIRECT, else ctrl[control] clamped to [ctrl_low, ctrl_high].
+    What mjwrap integrates is read at the start only: a later stage of Runge-Kutta goes on from there. Activations:
+
+        FROM_ACT          act[index]
+        FROM_NEXT_ACT     what act[index] will be a timestep later
+        FROM_CTRL         the drive
+        FROM_EXCITATION   the drive
+        STATE_IN_MJWRAP   own[m, 0]; the fibre length is own[m, 1]
+        STATE_IN_ACT      act[index]; the fibre length is act[index + 1]
+
+    The drive is the excitation for STATE_IN_MJWRAP and FROM_EXCITATION, else ctrl[control] held within its limits.
     """
     source, index, act, own = muscles.source, muscles.index, inputs.act, inputs.own
     activation, fiber, drive = start.activation, start.fiber, start.drive
     for m in range(source.shape[0]):
-        own_drive = source[m] == OWN or source[m] == DIRECT
+        own_drive = source[m] == STATE_IN_MJWRAP or source[m] == FROM_EXCITATION
         if own_drive:
             drive[m] = inputs.excitation[m]
         else:
@@ -50,25 +61,25 @@ def read_states(muscles, inputs, timing, start):
             drive[m] = min(max(wanted, muscles.ctrl_low[m]), muscles.ctrl_high[m])
         if source[m] == FROM_ACT:
             activation[m] = act[index[m]]
-        elif source[m] == EARLY:
+        elif source[m] == FROM_NEXT_ACT:
             activation[m] = next_activation(
                 muscles.form[m], muscles.times, m, act[index[m]], drive[m], timing.timestep
             )
-        elif source[m] == FROM_CTRL or source[m] == DIRECT:
+        elif source[m] == FROM_CTRL or source[m] == FROM_EXCITATION:
             activation[m] = drive[m]
         elif timing.since <= 0.0:
-            activation[m] = min(max(act[index[m]], 0.0), 1.0) if source[m] == KEPT else own[m, 0]
-            fiber[m] = act[index[m] + 1] if source[m] == KEPT else own[m, 1]
+            activation[m] = min(max(act[index[m]], 0.0), 1.0) if source[m] == STATE_IN_ACT else own[m, 0]
+            fiber[m] = act[index[m] + 1] if source[m] == STATE_IN_ACT else own[m, 1]
 
 
 @jit
 def write_states(source, index, activation, fiber, act, own):
     """Put the states that mjwrap integrates, (n,) each, back where `read_states` finds them."""
     for m in range(source.shape[0]):
-        if source[m] == KEPT:
+        if source[m] == STATE_IN_ACT:
             act[index[m]] = activation[m]
             act[index[m] + 1] = fiber[m]
-        elif source[m] == OWN:
+        elif source[m] == STATE_IN_MJWRAP:
             own[m, 0] = activation[m]
             own[m, 1] = fiber[m]
 
@@ -97,7 +108,7 @@ def drive_muscles(muscles, timing, start, states):
     duration = since + ahead
     for m in range(law.shape[0]):
         a, end = start.activation[m], start.activation[m]
-        if (source[m] == OWN or source[m] == KEPT) and not off[m]:
+        if (source[m] == STATE_IN_MJWRAP or source[m] == STATE_IN_ACT) and not off[m]:
             a = advance(form[m], end, start.drive[m], times[m, 0], times[m, 1], times[m, 2], since)
             if ahead > 0.0:
                 end = advance(form[m], end, start.drive[m], times[m, 0], times[m, 1], times[m, 2], duration)

@@ -12,9 +12,9 @@ class Muscles(NamedTuple):
 
     law: Ints  # code of the force law
     params: FloatRows  # (n, PARAMS), in the order of the law
-    source: Ints  # where the state comes from: FROM_ACT, FROM_CTRL, OWN, DIRECT, KEPT, EARLY
-    index: Ints  # of the state in `act`
-    control: Ints  # of the control in `ctrl`
+    source: Ints  # where activation and state come from: FROM_ACT, ..., FROM_NEXT_ACT of `dynamics.py`
+    index: Ints  # index of the state in `act`
+    control: Ints  # index of the control in `ctrl`
     ctrl_low: Floats  # limits of the control
     ctrl_high: Floats
     form: Ints  # of the activation dynamics

@@ -13,8 +13,8 @@ from mjwrap.kernels.musculotendon import bezier
 
 CODE = 3
 LEAST = 0.4441  # shortest fibre that can pull [l_o]
-FASTEST = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
-MOST = 80  # Newton steps and bisections for a velocity; three or four are normal
+MAX_VELOCITY = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
+MAX_STEPS = 80  # Newton steps and bisections for a velocity; three or four are normal
 
 
 def _active():
@@ -49,9 +49,9 @@ def _velocity():
 
 def _passive():
     strain, low, high = 0.7, 0.2, 2.0 / 0.7
-    foot = min(0.1 / high, 0.1 * strain)
-    y = low * 0.5 * foot
-    ends = [(1.0, 0.0, 0.0, 1.0 + foot, y, low), (1.0 + foot, y, low, 1.0 + strain, 1.0, high)]
+    toe = min(0.1 / high, 0.1 * strain)
+    y = low * 0.5 * toe
+    ends = [(1.0, 0.0, 0.0, 1.0 + toe, y, low), (1.0 + toe, y, low, 1.0 + strain, 1.0, high)]
     return bezier.corners(ends, [0.75, 0.75])
 
 
@@ -60,10 +60,10 @@ def _tendon():
     stiffness = 1.375 / strain
     x_toe = 1.0 + strain + (toe - 1.0) / stiffness
     x_middle = 1.0 + strain + (0.5 * toe - 1.0) / stiffness
-    x_foot = 1.0 + (x_toe - 1.0) / 10.0
-    slope = 0.5 * toe / (x_middle - x_foot)
-    x = x_foot + 0.5 * (x_middle - x_foot)
-    y = slope * (x - x_foot)
+    x_start = 1.0 + (x_toe - 1.0) / 10.0
+    slope = 0.5 * toe / (x_middle - x_start)
+    x = x_start + 0.5 * (x_middle - x_start)
+    y = slope * (x - x_start)
     return bezier.corners([(1.0, 0.0, 0.0, x, y, slope), (x, y, slope, x_toe, toe, stiffness)], [0.5, 0.5])
 
 
@@ -110,7 +110,7 @@ def balancing_velocity(strength, damping, wanted, close):
     The start takes the curve as straight from rest to where it alone would balance; Newton's steps are kept in a
     bracket. The last step is at most `close`; the error left is its square.
     """
-    low, high = -FASTEST, FASTEST
+    low, high = -MAX_VELOCITY, MAX_VELOCITY
     v = 0.0
     excess = wanted - strength
     if strength > 0.0:
@@ -124,7 +124,7 @@ def balancing_velocity(strength, damping, wanted, close):
         v = excess / damping
     v = min(max(v, low), high)
     force = slope = step = 0.0
-    for _ in range(MOST):
+    for _ in range(MAX_STEPS):
         force, slope = velocity(v)
         off = wanted - strength * force - damping * v
         if off > 0.0:
@@ -132,7 +132,7 @@ def balancing_velocity(strength, damping, wanted, close):
         else:
             high = v
         steepness = strength * slope + damping
-        new = v + off / steepness if steepness > 0.0 else 2.0 * FASTEST
+        new = v + off / steepness if steepness > 0.0 else 2.0 * MAX_VELOCITY
         if not low <= new <= high:
             new = 0.5 * (low + high)
         step = new - v

@@ -250,7 +250,7 @@ def sideways_shifts(count, twist, points):
 
 
 @jit
-def _pull(sign, i, arm, j, column, points, out):
+def _add_force_and_moment(sign, i, arm, j, column, points, out):
     """Add to out[slot of point i] the vector in `column` of point j and its moment at the end of `arm`, with a sign."""
     k = int(points[i, D_SLOT])
     fx, fy, fz = sign * points[j, column], sign * points[j, column + 1], sign * points[j, column + 2]
@@ -267,8 +267,8 @@ def _pull(sign, i, arm, j, column, points, out):
 def add_gradient(count, points, out):
     """Add dl/dx (n + 2, 6) to out: what tension one asks of every pose, force and moment about its origin."""
     for i in range(1, count):
-        _pull(1.0, i, D_P, i, D_E, points, out)
-        _pull(-1.0, i - 1, D_Q, i, D_E, points, out)
+        _add_force_and_moment(1.0, i, D_P, i, D_E, points, out)
+        _add_force_and_moment(-1.0, i - 1, D_Q, i, D_E, points, out)
 
 
 @jit
@@ -293,8 +293,8 @@ def add_stiffness_times(count, twist, points, out):
     """
     sideways_shifts(count, twist, points)
     for i in range(1, count):
-        _pull(1.0, i, D_P, i, D_RATE, points, out)
-        _pull(-1.0, i - 1, D_Q, i, D_RATE, points, out)
+        _add_force_and_moment(1.0, i, D_P, i, D_RATE, points, out)
+        _add_force_and_moment(-1.0, i - 1, D_Q, i, D_RATE, points, out)
         if points[i, D_TOUCHED] == FIXED:
             continue
         k = int(points[i, D_SLOT])

@@ -97,7 +97,7 @@ def lengthening_rate(count, seg, pos, twist):
 
 
 @jit
-def _pull(wrench, row, px, py, pz, fx, fy, fz):
+def _add_point_force(wrench, row, px, py, pz, fx, fy, fz):
     """Add force f at point p to wrench[row]: force, then moment about the world origin."""
     wrench[row, 0] += fx
     wrench[row, 1] += fy
@@ -117,5 +117,5 @@ def add_wrenches(count, seg, tension, wrench):
     for j in range(count):
         fx, fy, fz = tension * seg[j, G_E], tension * seg[j, G_E + 1], tension * seg[j, G_E + 2]
         near, far = int(seg[j, G_NEAR]) + 1, int(seg[j, G_FAR]) + 1
-        _pull(wrench, near, seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2], fx, fy, fz)
-        _pull(wrench, far, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2], -fx, -fy, -fz)
+        _add_point_force(wrench, near, seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2], fx, fy, fz)
+        _add_point_force(wrench, far, seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2], -fx, -fy, -fz)

@@ -5,10 +5,10 @@ active-set method: init, rounds, terminate. A round has four phases:
 
 1. Newton's method makes the path over the touched obstacles tangent (`_find_tangent_path`);
 2. the certificate says whether it is a local minimum of length (`certify.is_local_minimum`);
-3. lift-off and touchdown change which obstacles are touched (`_update_active_set`, `_mend_contacts`);
-4. where neither helps, a repair gives another start (`restarts.repair`).
+3. lift-off and touchdown change which obstacles are touched (`_update_active_set`, `_split_or_merge_contacts`);
+4. where neither helps, a restart gives another start (`restarts.restart`).
 
-It ends when a certified path needs no change, or when no repair is left.
+It ends when a certified path needs no change, or when no restart is left.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit, no_inline
 from mjwrap.kernels.geometry.traits import closed_form, one_sided
 from mjwrap.kernels.spans.cold_start import path_length, wrap_in_turn
 from mjwrap.kernels.spans.lift_off_touchdown import (
@@ -29,7 +29,7 @@ from mjwrap.kernels.spans.lift_off_touchdown import (
     split_at_hollow,
     touchdown,
 )
-from mjwrap.kernels.spans.restarts import out_of_repairs, repair
+from mjwrap.kernels.spans.restarts import out_of_restarts, restart
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, save_solutions
 from mjwrap.kernels.spans.side_search import search_sides, try_other_sides
 from mjwrap.kernels.tangency.certify import is_local_minimum
@@ -37,25 +37,25 @@ from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED, n
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 from mjwrap.kernels.wraps.single import contains
 
-HINT, S_MODE, W_OLD, W_FRESH = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_FRESH
+HINT, S_MODE, W_OLD, W_WRAP_ERROR = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_WRAP_ERROR
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 MAX_NEWTON = 25  # steps of Newton's method in a round
-MAX_ROUNDS = 50  # changes of the set of touched obstacles, repairs included
+MAX_ROUNDS = 50  # changes of the set of touched obstacles, restarts included
 COLD_PASSES = 3  # of obstacle-by-obstacle wrapping before Newton's method is tried
 EXTRA_CHANGES = (
     4  # changes of the set of touched obstacles, beyond one for each, that count as going round in circles
 )
 
 
-@apart
+@no_inline
 def solve_active_set(lo, hi, ends, node, tol, direct):
     """Find the path as `solve_span` says, from the saved solution alone, for ends that lie outside of every surface."""
     cold, known, evaluations = _init(lo, hi, ends, node, direct)
-    iterations, repairs, changes = 0, 0, 0
+    iterations, restarts, changes = 0, 0, 0
     error = 0.0
     status = lay.CONVERGED
-    settled = False
+    final = False
     for _ in range(MAX_ROUNDS):
         tangent, error, known, i, e = _find_tangent_path(lo, hi, ends, node, tol, known)
         iterations += i
@@ -63,24 +63,24 @@ def solve_active_set(lo, hi, ends, node, tol, direct):
         if tangent and is_local_minimum(lo, hi, node):
             changed, status = _update_active_set(lo, hi, ends, node)
             if changed == 0:
-                settled = True
+                final = True
                 break
         else:
-            changed = _mend_contacts(lo, hi, ends, node, tangent)
+            changed = _split_or_merge_contacts(lo, hi, ends, node, tangent)
         if changed > 0:
             changes += 1
             # without this bound an obstacle could be touched and lifted off in turn for ever
             if changes <= hi - lo + EXTRA_CHANGES:
                 continue
         saddle = tangent and changes == 0
-        if out_of_repairs(lo, hi, repairs):
+        if out_of_restarts(lo, hi, restarts):
             status = lay.NOT_MINIMAL if saddle else lay.NOT_CONVERGED
             break
-        evaluations += repair(lo, hi, ends, node, repairs, saddle, cold)
-        repairs += 1
+        evaluations += restart(lo, hi, ends, node, restarts, saddle, cold)
+        restarts += 1
         changes = 0
-    status = _terminate(lo, hi, ends, node, settled, status)
-    _store(lo, hi, node, settled, repairs)
+    status = _terminate(lo, hi, ends, node, final, status)
+    _store(lo, hi, node, final, restarts)
     if not math.isfinite(error):
         status = lay.NOT_CONVERGED
     return status, path_length(lo, hi, ends, node), error, iterations, evaluations
@@ -95,7 +95,7 @@ def _init(lo, hi, ends, node, direct):
     """Prepare the start; return (whether it is a cold one, what the rows hold of it, evaluations).
 
     A warm start is left as it is, but with `direct` a lone obstacle is wrapped anew on its saved branch. W_OLD holds
-    the start to which repairs go back. What the rows hold of it is as for `newton`.
+    the start to which restarts go back. What the rows hold of it is as for `newton`.
     """
     lone = hi - lo == 1
     evaluations = 0
@@ -112,8 +112,8 @@ def _init(lo, hi, ends, node, direct):
         save_solutions(lo, hi, node, W_OLD)
     known = GEODESICS_EVALUATED if cold or (direct and lone) else NOT_EVALUATED
     # a wrap that was searched for ends with Newton's method, which has evaluated the path as well
-    if cold and lone and node[lo, W_FRESH] >= 0.0 and not closed_form(lo, node):
-        known = node[lo, W_FRESH]
+    if cold and lone and node[lo, W_WRAP_ERROR] >= 0.0 and not closed_form(lo, node):
+        known = node[lo, W_WRAP_ERROR]
     return cold, known, evaluations
 
 
@@ -172,7 +172,7 @@ def _update_active_set(lo, hi, ends, node):
 
 
 @jit
-def _mend_contacts(lo, hi, ends, node, tangent):
+def _split_or_merge_contacts(lo, hi, ends, node, tangent):
     """Split or merge contacts of a path that is no minimum; return how many.
 
     A tangent one may run through a hollow that a string bridges. Where Newton's method has failed, the segment over a
@@ -187,9 +187,9 @@ def _mend_contacts(lo, hi, ends, node, tangent):
 
 
 @inlined
-def _terminate(lo, hi, ends, node, settled, status):
-    """Return the status of the last iterate; `settled`: it is certified and needs no change."""
-    if not settled:
+def _terminate(lo, hi, ends, node, final, status):
+    """Return the status of the last iterate; `final`: it is certified and needs no change."""
+    if not final:
         if _an_end_is_inside(lo, hi, ends, node):
             return lay.ENDPOINT_INSIDE
         if status == lay.NOT_MINIMAL:
@@ -207,12 +207,12 @@ def _terminate(lo, hi, ends, node, settled, status):
 
 
 @inlined
-def _store(lo, hi, node, settled, repairs):
-    """Leave in the rows what the next solve needs; hints that a repair has ignored count again."""
-    node[lo, lay.W_REPAIRS] = repairs
+def _store(lo, hi, node, final, restarts):
+    """Leave in the rows what the next solve needs; hints that a restart has ignored count again."""
+    node[lo, lay.W_RESTARTS] = restarts
     for k in range(lo, hi):
         node[k, HINT] = abs(node[k, HINT])
-        if settled and node[k, S_MODE] == TOUCHED:
+        if final and node[k, S_MODE] == TOUCHED:
             node[k, lay.S_BEFORE] = node[k, lay.W_L]
             node[k, lay.S_BEFORE + 1] = node[k, lay.W_LQ]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import allocating, jit
-from mjwrap.kernels.geometry.dispatch import known
+from mjwrap.kernels.geometry.dispatch import is_surface_kind
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.spans.cold_start import path_length
 from mjwrap.kernels.spans.end_inside import has_valid_length
@@ -44,7 +44,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     strange = False  # whether the span has a surface of a kind that no kernel knows
     for k in range(lo, hi + 1):
         if k < hi and node[k, KIND] != lay.VIA:
-            strange = strange or not known(node[k, KIND])
+            strange = strange or not is_surface_kind(node[k, KIND])
             continue
         if k < hi:
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
@@ -155,10 +155,10 @@ def extrapolate(node, before):
 
 
 @jit
-def _was_repaired(node):
-    """Return whether a span of the last solve needed a repair, a start other than the one that it was given."""
+def _was_restarted(node):
+    """Return whether a span of the last solve needed a restart, a start other than the one that it was given."""
     for k in range(node.shape[0]):
-        if node[k, KIND] != lay.VIA and node[k, lay.W_REPAIRS] > 0.0:
+        if node[k, KIND] != lay.VIA and node[k, lay.W_RESTARTS] > 0.0:
             return True
     return False
 
@@ -194,7 +194,7 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
         u, v, w = insertion[j, 0], insertion[j, 1], insertion[j, 2]
         solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
         # the straight continuation may have led astray: solve once more from the pose before
-        if warm and j > 0 and _was_repaired(node):
+        if warm and j > 0 and _was_restarted(node):
             _return_to_previous_pose(node, before)
             solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
         if warm and not has_valid_length(info[j, I_STATUS], info[j, I_ERROR]):

@@ -61,7 +61,7 @@ def wrap_in_turn(lo, hi, ends, node, passes, centred):
         for k in range(lo, hi):
             qx, qy, qz = next_contact_point(k, hi, ends, node, centred)
             if i == 0:
-                node[k, lay.W_FRESH] = -1.0
+                node[k, lay.W_WRAP_ERROR] = -1.0
             wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, i % SEARCH_EVERY == 0)
             if node[k, S_MODE] == TOUCHED:
                 x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]

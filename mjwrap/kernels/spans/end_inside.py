@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import nearest
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.geometry.traits import closed_form
@@ -88,7 +88,7 @@ def _is_too_deep(k, point, normal, curvature, ends, column, node):
 
 
 @jit
-def _free(lo, hi, node):
+def _lift_all(lo, hi, node):
     """Take the string off rows lo..hi; the sides that they keep stay."""
     for k in range(lo, hi):
         node[k, S_MODE] = lay.FREE
@@ -96,7 +96,7 @@ def _free(lo, hi, node):
             node[k, S_MODE + i] = 0.0
 
 
-@apart
+@no_inline
 def substitute_path(lo, hi, ends, node, tol, direct):
     """Find the substitute path of a span with an end inside; return (length, error, iterations, evaluations).
 
@@ -152,8 +152,8 @@ def substitute_path(lo, hi, ends, node, tol, direct):
         if status != lay.CONVERGED and ((over_a and leaves_a) or (over_b and leaves_b)):
             return best, NO_SUBSTITUTE, iterations, evaluations
         if status == lay.CONVERGED and length > best:
-            _free(lo, first, node)
-            _free(last, hi, node)
+            _lift_all(lo, first, node)
+            _lift_all(last, hi, node)
             save_solutions(lo, hi, node, lay.W_START)
             best, error = length, off
         status = lay.CONVERGED
@@ -173,7 +173,7 @@ def has_valid_length(status, error):
 
 
 @jit
-def _pull(j, k, point, tangent, normal, binormal, curvature, end, node, base, seg):
+def _set_substitute_pull(j, k, point, tangent, normal, binormal, curvature, end, node, base, seg):
     """Let segment j pull between the surface and its end, at the end: e = (I + h W)^-1 t."""
     # height of the end over the contact, negative
     h = 0.0
@@ -203,7 +203,9 @@ def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
         to_surface = far < hi and node[far, KIND] != lay.VIA
         a, b, c = seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2]
         if to_surface and not from_surface and node[far, lay.INSIDE] == 0.0 and contains(far, node, a, b, c):
-            _pull(j, far, lay.W_P, lay.W_TP, lay.W_NP, lay.W_BP, lay.W_KP, G_A, node, base, seg)
+            _set_substitute_pull(
+                j, far, lay.W_P, lay.W_TP, lay.W_NP, lay.W_BP, lay.W_KP, G_A, node, base, seg
+            )
         a, b, c = seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2]
         if (
             from_surface
@@ -211,5 +213,7 @@ def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
             and node[near, lay.INSIDE] == 0.0
             and contains(near, node, a, b, c)
         ):
-            _pull(j, near, lay.W_Q, lay.W_TQ, lay.W_NQ, lay.W_BQ, lay.W_KQ, G_B, node, base, seg)
+            _set_substitute_pull(
+                j, near, lay.W_Q, lay.W_TQ, lay.W_NQ, lay.W_BQ, lay.W_KQ, G_B, node, base, seg
+            )
     return count

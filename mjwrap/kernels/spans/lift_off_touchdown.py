@@ -1,7 +1,7 @@
 """The active set of a span, the obstacles that its path touches: lift-off, touchdown, contacts split and merged.
 
 "Touching or not" in docs/derivation.md. A straight segment is tested against a surface in `_penetrates`, by
-`geometry.dispatch.dip`. A surface with hollows has two rows, as a string may touch it on both sides of a hollow that
+`segment_clearance`. A surface with hollows has two rows, as a string may touch it on both sides of a hollow that
 it bridges ("Hollows"): the second one has a number in TOUCH.
 """
 
@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
-from mjwrap.kernels.geometry.dispatch import dip, swept
+from mjwrap.kernels.geometry.dispatch import segment_clearance, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import branched, hollow
-from mjwrap.kernels.geometry.winding import follow
+from mjwrap.kernels.geometry.winding import unwrap_angle
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, SLIPPED
 from mjwrap.kernels.wraps.single import wrap
 
@@ -22,18 +22,19 @@ S_MODE, S_SWEEP, S_P, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_ARC
 W_P, W_Q = lay.W_P, lay.W_Q
 FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
-MERGE_DISTANCE = 1e-5  # contacts on both sides of a hollow that are so near, in the surface's size, have met
+# Lengths are shares of the surface's size.
+MERGE_DISTANCE = 1e-5  # contacts on both sides of a hollow that are nearer to each other than this have met
 MERGE_DISTANCE_ON_FAILURE = (
     1e-3  # the same where Newton's method fails: a segment that vanishes has no direction
 )
-HOLLOW_SAMPLES = 24  # of a geodesic, to find where it runs through a hollow
-LEAST_DEPTH = (
-    -1e-9
-)  # a segment that dips less below the surface that it leaves or meets, in its size, only touches it
+HOLLOW_SAMPLES = 24  # samples of a geodesic, to find where it runs through a hollow
+PENETRATION_DEPTH = (
+    1e-9  # a segment that goes less deep below a surface counts as touching it, not as entering it
+)
 
 
 @jit
-def _has_twin(k, hi, node):
+def _has_second_row(k, hi, node):
     """Return whether the next row is the same surface once more."""
     return k + 1 < hi and node[k + 1, lay.TOUCH] != 0.0
 
@@ -49,11 +50,11 @@ def follow_branch(lo, hi, node):
         if node[k, S_MODE] != TOUCHED or node[k, S_ARC] < 0.0:
             continue
         if branched(k, node) and node[k, lay.TOUCH] == 0.0:
-            angle = swept(k, node)
-            if _has_twin(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
+            angle = winding_angle(k, node)
+            if _has_second_row(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
                 node[k, S_SWEEP] = angle
             # another branch differs by whole turns, the same one by rounding: any bound in between will do
-            elif abs(angle - follow(angle, node[k, S_SWEEP])) > 1.0:
+            elif abs(angle - unwrap_angle(angle, node[k, S_SWEEP])) > 1.0:
                 same = False
             else:
                 node[k, S_SWEEP] = angle
@@ -89,8 +90,8 @@ def _penetrates(k, node, ends, ax, ay, az, bx, by, bz):
     x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
     ax, ay, az = turn_into_frame(node, k, ax - x, ay - y, az - z)
     bx, by, bz = turn_into_frame(node, k, bx - x, by - y, bz - z)
-    low, _ = dip(node, k, ax, ay, az, bx, by, bz)
-    return low < LEAST_DEPTH * node[k, SIZE]
+    low, _ = segment_clearance(node, k, ax, ay, az, bx, by, bz)
+    return low < -PENETRATION_DEPTH * node[k, SIZE]
 
 
 @jit
@@ -120,7 +121,7 @@ def split_at_hollow(lo, hi, ends, node):
     for k in range(lo, hi - 1):
         if node[k, S_MODE] != TOUCHED or node[k, lay.W_KMIN] >= 0.0:
             continue
-        if not _has_twin(k, hi, node) or node[k + 1, S_MODE] == TOUCHED:
+        if not _has_second_row(k, hi, node) or node[k + 1, S_MODE] == TOUCHED:
             continue
         arc = node[k, S_ARC]
         # first and last of the pieces at whose end the surface is concave along the geodesic
@@ -170,7 +171,7 @@ def merge_contacts(lo, hi, ends, node, distance):
     """
     count = 0
     for k in range(lo, hi - 1):
-        if node[k, S_MODE] != TOUCHED or not _has_twin(k, hi, node) or node[k + 1, S_MODE] != TOUCHED:
+        if node[k, S_MODE] != TOUCHED or not _has_second_row(k, hi, node) or node[k + 1, S_MODE] != TOUCHED:
             continue
         if node[k, lay.W_LQ] > distance * node[k, SIZE]:
             continue
@@ -202,13 +203,13 @@ def touchdown(lo, hi, ends, node):
         # a surface with hollows may be entered by the very segments that touch it
         if node[k, S_MODE] == TOUCHED and hollow(k, node):
             if _penetrates(k, node, ends, x, y, z, node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]):
-                if _has_twin(k, hi, node) and node[k + 1, S_MODE] != TOUCHED:
+                if _has_second_row(k, hi, node) and node[k + 1, S_MODE] != TOUCHED:
                     _move_to_second_row(k, node)
                     geodesic(k + 1, node, ends[0], ends[1], ends[2])
                     added += 1
                 elif status == lay.CONVERGED:
                     status = lay.PENETRATING
-            elif not _has_twin(k, hi, node):
+            elif not _has_second_row(k, hi, node):
                 _, qx, qy, qz = _next_contact(k, hi, ends, node)
                 last = _penetrates(
                     k, node, ends, node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2], qx, qy, qz

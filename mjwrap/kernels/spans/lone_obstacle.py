@@ -43,5 +43,5 @@ def solve_lone_obstacle(k, ends, node, tol):
     if not good:
         for i in range(lay.STATE):
             node[k, S_MODE + i] = node[k, W_OLD + i]
-    node[k, lay.W_REPAIRS] = 0.0
+    node[k, lay.W_RESTARTS] = 0.0
     return good, total, error

@@ -1,8 +1,8 @@
-"""Repairs: other starts for a span whose path was not found from the contacts that it had.
+"""Restarts: other starting points for a span whose path was not found from the contacts that it had.
 
-Obstacle after obstacle is wrapped by itself between its neighbours' contact points; each such wrap shortens the path.
-The first repair starts from the saved solution, the third from nothing. A saddle is left sideways first, where the path
-gets shorter.
+Each obstacle is wrapped by itself between its neighbours' contact points, one after the other; every such wrap shortens
+the path. The first restart begins with the saved solution, the third with no contacts. A path that is a saddle of
+length is first moved sideways, in a direction in which it gets shorter.
 """
 
 from __future__ import annotations
@@ -17,40 +17,43 @@ from mjwrap.kernels.tangency.certify import shift_off_saddle
 
 HINT, S_MODE, W_OLD, W_Q, W_Y = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Q, lay.W_Y
 
-MAX_REPAIRS = 4
-REPAIR_PASSES = 7  # the first repair; further ones take about twice as many each
-FORGET_AFTER = 2  # repairs after which the search begins anew
-SADDLE_SHIFT = 0.3  # off a saddle, in radii
+MAX_RESTARTS = 4
+RESTART_PASSES = (
+    7  # passes over the obstacles in the first restart; every further one takes about twice as many
+)
+COLD_RESTART = 2  # number of the restart that forgets all contacts, counted from 0
+SADDLE_SHIFT = 0.3  # how far a path is moved off a saddle, in the surface's size
 
 
 @jit
-def out_of_repairs(lo, hi, repairs):
-    """Return whether no repair is left: a lone obstacle has one, as further passes would wrap it the same way."""
-    return repairs == MAX_REPAIRS or (hi - lo == 1 and repairs == 1)
+def out_of_restarts(lo, hi, restarts):
+    """Return whether no restart is left: a lone obstacle has one, because further passes would wrap it the same way."""
+    return restarts == MAX_RESTARTS or (hi - lo == 1 and restarts == 1)
 
 
 @jit
-def repair(lo, hi, ends, node, repairs, saddle, cold):
-    """Give the span another start, its repair number `repairs` from 0 on; return the evaluations spent.
+def restart(lo, hi, ends, node, restarts, saddle, cold):
+    """Give the span another starting point; return the number of evaluations.
 
-    saddle: the rows hold a tangent path that is no minimum of length. cold: the solve began at a cold start.
+    restarts: how many restarts there were before. saddle: the rows hold a tangent path that is not a minimum of length.
+    cold: the solve began at a cold start.
     """
-    if repairs == 0 and not saddle:
+    if restarts == 0 and not saddle:
         restore_solutions(lo, hi, ends, node, W_OLD)
-    if repairs == FORGET_AFTER:
-        _forget_solution(lo, hi, cold, node)
+    if restarts == COLD_RESTART:
+        _start_cold(lo, hi, cold, node)
     elif saddle:
-        # one side first, then the other: which of them is the shorter way down is not known
-        _leave_saddle(lo, hi, ends, node, 1.0 if repairs % 2 == 0 else -1.0)
-    passes = (REPAIR_PASSES + repairs) << repairs if hi - lo > 1 else 1
+        # to one side first, the next time to the other: which of them leads to the shorter path is not known
+        _leave_saddle(lo, hi, ends, node, 1.0 if restarts % 2 == 0 else -1.0)
+    passes = (RESTART_PASSES + restarts) << restarts if hi - lo > 1 else 1
     return wrap_in_turn(lo, hi, ends, node, passes, False)
 
 
 @jit
-def _forget_solution(lo, hi, cold, node):
-    """Forget what was found and ignore the hints: they may ask for a side on which no string holds.
+def _start_cold(lo, hi, cold, node):
+    """Remove all contacts and ignore the hints, which may ask for a side on which no string can stay.
 
-    A warm start keeps its topological sides; what it loses is a minimum that has ceased to exist.
+    A warm start keeps the sides that are topological. Its other contacts belong to a minimum that no longer exists.
     """
     for k in range(lo, hi):
         if cold or not branched(k, node):
@@ -60,9 +63,9 @@ def _forget_solution(lo, hi, cold, node):
 
 @jit
 def _leave_saddle(lo, hi, ends, node, sign):
-    """Move a path that is a saddle of length a little down the side on which a string would slip.
+    """Move a path that is a saddle of length a little to the side to which a string would slip.
 
-    The obstacles behind the last one moved follow first: wraps in order from the origin on would undo the move.
+    Then the obstacles behind the last one that was moved are wrapped: wrapping from the origin on would undo the move.
     """
     failed = shift_off_saddle(lo, hi, node, SADDLE_SHIFT)
     if failed < 0:

@@ -11,7 +11,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
-from mjwrap.kernels.geometry.traits import branched, closed_form, drawn_hints
+from mjwrap.kernels.geometry.traits import branched, closed_form, random_starts
 from mjwrap.kernels.geometry.winding import TWO_PI
 from mjwrap.kernels.spans.cold_start import ends_of_part, path_length, wrap_in_turn
 from mjwrap.kernels.spans.lift_off_touchdown import (
@@ -33,18 +33,18 @@ S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_Q, W_OLD = lay.W_Q, lay.W_OLD
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
-LEAST_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
-MOST_FLIPS = 3  # neighbours that change sides together
-WINDOW = 4  # obstacles to both sides of those that change sides that are free to follow
-MOST_SWEEPS = 4  # over the whole row
+LEAST_FLIPPED_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
+MAX_FLIPS = 3  # neighbours that change sides together
+FLIP_NEIGHBOURS = 4  # obstacles to both sides of those that change sides that are free to follow
+MAX_SWEEPS = 4  # over the whole row
 PENALTY = 1e3  # is added to the length of a path that is out of range or not found [m]
-PROMISING = 0.05  # another way that is longer by less, relatively, is pulled tight before it is given up
-PULL_TOL = 1e-6  # tangency error at which its length is known
+TRIAL_MARGIN = 0.05  # another way that is longer by less, relatively, is pulled tight before it is given up
+TRIAL_TOL = 1e-6  # tangency error at which its length is known
 MAX_CHANGES = 6  # of the set of touched obstacles while a path is pulled tight
 MAX_NEWTON = 15  # steps of Newton's method between two changes
 GROUP = 5  # neighbours that get random hints at once
-GROUP_STRIDE = 3  # obstacles from one such group to the next
-NEIGHBOURS = 2  # obstacles to both sides of a group that are free to follow
+GROUP_STEP = 3  # obstacles from one such group to the next
+GROUP_NEIGHBOURS = 2  # obstacles to both sides of a group that are free to follow
 PATTERNS = 12  # of hints that are tried where the row is one group
 PATTERNS_PER_GROUP = 8  # for each group of a longer row
 EXTRA_PATTERNS = 4  # times as many while there is no path, or none in range
@@ -53,16 +53,16 @@ UNTOUCHED_CHANCE = 0.25  # that a pattern leaves an obstacle untouched
 
 
 @jit
-def pull_tight(lo, hi, ends, node):
+def make_tangent(lo, hi, ends, node):
     """Make the path over lo..hi tangent, from what it touches now; return whether it is certified, and the evaluations.
 
     As `active_set_method.solve_active_set`, but without restarts and to a larger tolerance: a failed trial is given up.
     """
     spent = 0
     for _ in range(MAX_CHANGES):
-        error, _, e = newton(lo, hi, ends, node, PULL_TOL, MAX_NEWTON, NOT_EVALUATED)
+        error, _, e = newton(lo, hi, ends, node, TRIAL_TOL, MAX_NEWTON, NOT_EVALUATED)
         spent += e
-        if not error <= PULL_TOL or not follow_branch(lo, hi, node):
+        if not error <= TRIAL_TOL or not follow_branch(lo, hi, node):
             return False, spent
         if not is_local_minimum(lo, hi, node):
             if split_at_hollow(lo, hi, ends, node) == 0:
@@ -87,9 +87,9 @@ def _try_part(first, last, part, node, before, passes):
     """Try a start over first..last: return whether its path is shorter than `before` [m], and the evaluations spent."""
     spent = wrap_in_turn(first, last, part, node, passes, False)
     # wraps in turn leave it a little too long; only what is nearly as short is worth Newton's method
-    if not path_length(first, last, part, node) < before * (1.0 + PROMISING):
+    if not path_length(first, last, part, node) < before * (1.0 + TRIAL_MARGIN):
         return False, spent
-    good, e = pull_tight(first, last, part, node)
+    good, e = make_tangent(first, last, part, node)
     return good and _penalised_length(first, last, part, node) < before * (1.0 - 1e-9), spent + e
 
 
@@ -104,7 +104,7 @@ def _can_change_side(k, node):
         return False
     if node[k, S_MODE] != TOUCHED:
         return False
-    return abs(node[k, S_SWEEP]) >= LEAST_SWEEP or not in_range(k, k + 1, (0.0,) * 9, node)
+    return abs(node[k, S_SWEEP]) >= LEAST_FLIPPED_SWEEP or not in_range(k, k + 1, (0.0,) * 9, node)
 
 
 @jit
@@ -149,22 +149,22 @@ def _whole_surfaces(lo, hi, first, last, node):
 
 @jit
 def try_other_sides(lo, hi, ends, node, passes):
-    """Try other sides for all obstacles without a hint, and keep what is shorter; return the evaluations spent.
+    """Try other sides for all obstacles without a hint, and keep shorter paths; return the number of evaluations.
 
-    Sides known in closed form change in runs of up to MOST_FLIPS neighbours together; others are searched for anew,
-    one at a time, between the contacts that their neighbours have now. The path WINDOW obstacles to both sides is free
-    to follow. Ends when nothing gets shorter: a local search, at cold starts only.
+    Sides that have a closed form are changed for up to MAX_FLIPS neighbours together; other obstacles are searched for
+    anew, one at a time, between the present contacts of their neighbours. FLIP_NEIGHBOURS obstacles on both sides are
+    solved with them. Ends when nothing gets shorter: a local search, at cold starts only.
     """
     spent = 0
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         changed = False
-        for run in range(1, MOST_FLIPS + 1):
+        for run in range(1, MAX_FLIPS + 1):
             for k in range(lo, hi - run + 1):
                 # a run may hold obstacles that stay as they are, but not at its ends
                 whole = _can_change_side(k, node) and _can_change_side(k + run - 1, node)
                 if not (whole or (run == 1 and _can_be_searched(k, node))):
                     continue
-                first, last = _whole_surfaces(lo, hi, k - WINDOW, k + run + WINDOW, node)
+                first, last = _whole_surfaces(lo, hi, k - FLIP_NEIGHBOURS, k + run + FLIP_NEIGHBOURS, node)
                 part = ends_of_part(lo, hi, first, last, ends, node)
                 before = _penalised_length(first, last, part, node)
                 save_solutions(first, last, node, W_OLD)
@@ -207,18 +207,18 @@ def _draw_hint(k, node, pattern, place_in_row):
     # a direction evenly distributed on the sphere: z and the angle about it are
     z = 2.0 * _pseudo_random(pattern, place_in_row, 1) - 1.0
     angle = TWO_PI * _pseudo_random(pattern, place_in_row, 2)
-    reach = node[k, SIZE]
-    flat = reach * math.sqrt(1.0 - z * z)
+    radius = node[k, SIZE]
+    flat = radius * math.sqrt(1.0 - z * z)
     node[k, HINT] = RANDOM_HINT
     node[k, HINT + 1] = flat * math.cos(angle)
     node[k, HINT + 2] = flat * math.sin(angle)
-    node[k, HINT + 3] = reach * z
+    node[k, HINT + 3] = radius * z
 
 
 @jit
 def _may_be_hinted(k, node):
     """Return whether obstacle k may get a random hint: it has none of its own."""
-    return node[k, HINT] == 0.0 and node[k, lay.TOUCH] == 0.0 and drawn_hints(k, node)
+    return node[k, HINT] == 0.0 and node[k, lay.TOUCH] == 0.0 and random_starts(k, node)
 
 
 @jit
@@ -247,7 +247,7 @@ def try_random_hints(lo, hi, ends, node, sound):
         # more patterns as long as there is no path, or none in range
         most = PATTERNS if first_group and end == hi else PATTERNS_PER_GROUP
         for pattern in range(EXTRA_PATTERNS * most):
-            first, last = _whole_surfaces(lo, hi, k - NEIGHBOURS, end + NEIGHBOURS, node)
+            first, last = _whole_surfaces(lo, hi, k - GROUP_NEIGHBOURS, end + GROUP_NEIGHBOURS, node)
             part = ends_of_part(lo, hi, first, last, ends, node)
             before = _penalised_length(first, last, part, node)
             if not sound and first == lo and last == hi:
@@ -276,7 +276,7 @@ def try_random_hints(lo, hi, ends, node, sound):
             else:
                 restore_solutions(first, last, ends, node, W_OLD)
         first_group = False
-        for _ in range(GROUP_STRIDE):
+        for _ in range(GROUP_STEP):
             k = _next_surface(k, hi, node)
     if changed:
         spent += try_other_sides(lo, hi, ends, node, 1)
@@ -307,7 +307,7 @@ def search_sides(lo, hi, ends, node, passes):
         else:
             restore_solutions(lo, hi, ends, node, lay.W_BEST)
     save_solutions(lo, hi, node, lay.W_BEST)
-    good, e = pull_tight(lo, hi, ends, node)
+    good, e = make_tangent(lo, hi, ends, node)
     if not good:
         restore_solutions(lo, hi, ends, node, lay.W_BEST)
     return spent + e + try_random_hints(lo, hi, ends, node, good)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, jit
+from mjwrap.kernels.compilation.jit import jit, no_inline
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.spans.active_set_method import solve_active_set
@@ -22,15 +22,15 @@ from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions,
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T
-W_OLD, W_START, W_FIRST = lay.W_OLD, lay.W_START, lay.W_FIRST
+W_OLD, W_START, W_START_ERROR = lay.W_OLD, lay.W_START, lay.W_START_ERROR
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 
 # Move of a free string's ends, in the surface's size, up to which it meets the surface on the side on which it was.
 FREE_MOVE = 0.25
 LARGE_ERROR = 0.1  # tangency error of an obstacle's old contact beyond which the move is a large one
 CONTACT_MOVE = 0.5  # of a contact on its surface, in its size, likewise
-STRIDE = 0.05  # of a string's ends in a large move, in the surface's size
-MOST_STRIDES = 100.0
+CONTINUATION_STEP = 0.05  # of a string's ends in a large move, in the surface's size
+MAX_CONTINUATION_STEPS = 100.0
 CLEARANCE_SHARE = 0.5  # share of a segment's height over the surface by which it cannot have passed through
 
 
@@ -59,7 +59,7 @@ def _free_string_moved_far(k, end, now, node):
     # one that runs high over the surface may move further
     clear = FREE_MOVE * node[k, SIZE]
     if not any_in_mode(k, end, node, TOUCHED):
-        clear = max(clear, CLEARANCE_SHARE * node[k, lay.W_LOW])
+        clear = max(clear, CLEARANCE_SHARE * node[k, lay.W_CLEARANCE])
     return known and max(a, b) > clear * clear
 
 
@@ -88,11 +88,11 @@ def _moved_far(lo, hi, ends, node):
             k, end, ends_of_part(lo, hi, k, end, ends, node), node
         ):
             return True
-    return follows and node[lo, W_FIRST] > LARGE_ERROR * LARGE_ERROR * (hi - lo)
+    return follows and node[lo, W_START_ERROR] > LARGE_ERROR * LARGE_ERROR * (hi - lo)
 
 
 @jit
-def _before(k, end, now, node):
+def _previous_ends(k, end, now, node):
     """Return whether it is known where the string ran beside rows k..end, and its ends then, as of a span.
 
     Relative to the surface, so that they have moved with it. Rows k..end are those of one surface.
@@ -131,17 +131,17 @@ def _before(k, end, now, node):
 
 
 @jit
-def _follow_in_strides(k, end, now, node, tol):
+def _continue_to_present_ends(k, end, now, node, tol):
     """Move the string over rows k..end from where it ran to its present ends `now`; return the evaluations spent.
 
     A continuation: the surface alone is solved at every stride, from the solution of the one before.
     """
-    known, old = _before(k, end, now, node)
+    known, old = _previous_ends(k, end, now, node)
     if not known:
         return 0
     a = math.sqrt((now[3] - old[3]) ** 2 + (now[4] - old[4]) ** 2 + (now[5] - old[5]) ** 2)
     b = math.sqrt((now[6] - old[6]) ** 2 + (now[7] - old[7]) ** 2 + (now[8] - old[8]) ** 2)
-    count = math.ceil(min(MOST_STRIDES, max(a, b) / (STRIDE * node[k, SIZE])))
+    count = math.ceil(min(MAX_CONTINUATION_STEPS, max(a, b) / (CONTINUATION_STEP * node[k, SIZE])))
     spent = 0
     for i in range(1, count + 1):
         f = i / count
@@ -160,8 +160,8 @@ def _follow_in_strides(k, end, now, node, tol):
     return spent
 
 
-@apart
-def _follow_large_move(lo, hi, ends, node, tol, direct, found):
+@no_inline
+def _solve_by_continuation(lo, hi, ends, node, tol, direct, found):
     """Solve again, by continuation from before a large move; where that fails, from a cold start.
 
     found: the solve just done has found a path, which is kept where strides lead to none.
@@ -172,7 +172,9 @@ def _follow_large_move(lo, hi, ends, node, tol, direct, found):
     for k in range(lo, hi):
         if not closed_form(k, node) and node[k, lay.TOUCH] == 0.0:
             end = surface_end(k, hi, node)
-            evaluations += _follow_in_strides(k, end, ends_of_part(lo, hi, k, end, ends, node), node, tol)
+            evaluations += _continue_to_present_ends(
+                k, end, ends_of_part(lo, hi, k, end, ends, node), node, tol
+            )
     status, total, error, iterations, e = solve_active_set(lo, hi, ends, node, tol, direct)
     evaluations += e
     if not _is_found(status):
@@ -185,7 +187,7 @@ def _follow_large_move(lo, hi, ends, node, tol, direct, found):
         iterations += i
         evaluations += e
     # `chain.solve_motion` reads this as: the extrapolated start was no good
-    node[lo, lay.W_REPAIRS] += 1.0
+    node[lo, lay.W_RESTARTS] += 1.0
     if status != lay.CONVERGED:
         for k in range(lo, hi):
             for j in range(lay.STATE):
@@ -208,12 +210,14 @@ def solve_span(lo, hi, ends, node, tol, direct):
         if good:
             return lay.CONVERGED, total, error, 0, 1
     # Newton's method writes the error of its very first evaluation there, by which `_moved_far` judges the start
-    node[lo, W_FIRST] = -1.0
+    node[lo, W_START_ERROR] = -1.0
     status, total, error, iterations, evaluations = solve_active_set(lo, hi, ends, node, tol, direct)
     if _is_found(status) and not (warm and _moved_far(lo, hi, ends, node)):
         return status, total, error, iterations, evaluations
     if warm and status != lay.ENDPOINT_INSIDE:
-        status, total, error, i, e = _follow_large_move(lo, hi, ends, node, tol, direct, _is_found(status))
+        status, total, error, i, e = _solve_by_continuation(
+            lo, hi, ends, node, tol, direct, _is_found(status)
+        )
         iterations += i
         evaluations += e
     if status == lay.ENDPOINT_INSIDE:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, inlined, jit
+from mjwrap.kernels.compilation.jit import inlined, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import project
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.projection import into_frame
@@ -19,7 +19,14 @@ from mjwrap.kernels.tangency.path_error import dot_columns
 from mjwrap.kernels.tangency.tangency_error import connect_segments, ends_on_surface, evaluate
 
 S_MODE, S_P, S_ARC, SIZE = lay.S_MODE, lay.S_P, lay.S_ARC, lay.SIZE
-W_E, W_L, W_NP, W_Y, W_SAVE, W_FIRST = lay.W_E, lay.W_L, lay.W_NP, lay.W_Y, lay.W_SAVE, lay.W_FIRST
+W_E, W_L, W_NP, W_Y, W_SAVE, W_START_ERROR = (
+    lay.W_E,
+    lay.W_L,
+    lay.W_NP,
+    lay.W_Y,
+    lay.W_SAVE,
+    lay.W_START_ERROR,
+)
 TOUCHED = lay.TOUCHED
 
 AT_END = 1e-11  # a contact nearer than this share of the size to an end on the surface is at it
@@ -31,7 +38,7 @@ MAX_HALVINGS = 6
 NOT_EVALUATED, GEODESICS_EVALUATED = -1.0, -2.0
 
 
-@apart
+@no_inline
 def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     """Iterate until ||f|| <= tol; return (||f||, iterations, evaluations), the last state left in the rows.
 
@@ -58,8 +65,8 @@ def init(lo, hi, ends, node, square):
         else:
             square = evaluate(lo, hi, ends, node)
         evaluations = 1
-    if node[lo, W_FIRST] < 0.0:
-        node[lo, W_FIRST] = square
+    if node[lo, W_START_ERROR] < 0.0:
+        node[lo, W_START_ERROR] = square
     if _start_at_end_on_surface(lo, hi, ends, node):
         square = evaluate(lo, hi, ends, node)
         evaluations += 1

@@ -27,7 +27,15 @@ from mjwrap.kernels.compilation.jit import inlined
 
 W_TP, W_TQ, W_NP, W_NQ, W_BP, W_BQ = lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ, lay.W_BP, lay.W_BQ
 W_KP, W_KQ = lay.W_KP, lay.W_KQ
-W_E, W_EQ, W_L, W_LQ, W_CP, W_CQ, W_PIN = lay.W_E, lay.W_EQ, lay.W_L, lay.W_LQ, lay.W_CP, lay.W_CQ, lay.W_PIN
+W_E, W_EQ, W_L, W_LQ, W_CP, W_CQ, W_END_ON_SURFACE = (
+    lay.W_E,
+    lay.W_EQ,
+    lay.W_L,
+    lay.W_LQ,
+    lay.W_CP,
+    lay.W_CQ,
+    lay.W_END_ON_SURFACE,
+)
 
 SHORTEST = 1e-150  # keeps the reciprocal of a vanishing segment finite [m]
 
@@ -88,7 +96,7 @@ def path_error_jacobian_at_Q(k, node):
     """Return (n_slide, n_shift, b_slide, b_shift, b_turn), the derivatives of rows 2 and 3 of h in σ, y, v.
 
     d(e'·n_Q) = n_slide σ + n_shift y,  d(e'·b_Q) = b_slide σ + b_shift y + b_turn v. Where the path ends at Q on the
-    surface (W_PIN), h holds how far Q is beyond that end along t and b, and the rows are σ and y themselves.
+    surface (W_END_ON_SURFACE), h holds how far Q is beyond that end along t and b, and the rows are σ and y themselves.
     """
     kappa, tau, beta = node[k, W_KQ], node[k, W_KQ + 1], node[k, W_KQ + 2]
     along, normal, binormal = node[k, W_CQ], node[k, W_CQ + 1], node[k, W_CQ + 2]  # e'·t, e'·n, e'·b
@@ -101,7 +109,7 @@ def path_error_jacobian_at_Q(k, node):
     b_slide = -tau * normal + binormal * along * over
     # row e'·b, shift: -b·D' b - β e'·n
     b_shift = -beta * normal - (1.0 - binormal * binormal) * over
-    if node[k, W_PIN] != 0.0:
+    if node[k, W_END_ON_SURFACE] != 0.0:
         n_slide, n_shift, b_slide, b_shift = 1.0, 0.0, 0.0, 1.0
     return n_slide, n_shift, b_slide, b_shift, -along
 

@@ -16,11 +16,11 @@ from mjwrap.kernels.tangency.path_error import SHORTEST, path_error_at_P, path_e
 S_MODE, SIZE, TOUCHED = lay.S_MODE, lay.SIZE, lay.TOUCHED
 W_P, W_Q, W_TP, W_TQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
 W_E, W_L, W_CP, W_CQ, W_LQ, W_EQ = lay.W_E, lay.W_L, lay.W_CP, lay.W_CQ, lay.W_LQ, lay.W_EQ
-W_PIN, W_LAND = lay.W_PIN, lay.W_LAND
+W_END_ON_SURFACE, W_END_TARGET = lay.W_END_ON_SURFACE, lay.W_END_TARGET
 
 ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
 LEAST_HEIGHT = 2e-12  # an end point lower above the surface than this share of the size lies on it
-LANDING_SCALE = (
+END_DISTANCE_SCALE = (
     0.01  # Q so far off an end on the surface, in its size, counts like a direction that is off by 1 rad
 )
 CORNER = 1e-6  # half the angle between two contacts that meet, beyond which they do not go on into each other [rad]
@@ -101,15 +101,15 @@ def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
     node[j, W_EQ + 1] = ey
     node[j, W_EQ + 2] = ez
     node[j, W_LQ] = size
-    node[j, W_PIN] = 0.0
+    node[j, W_END_ON_SURFACE] = 0.0
     along, normal, binormal = path_error_at_Q(j, node)
-    if last and (node[j, W_LAND] != 0.0 or ends_on_surface(j, normal, size, node)):
+    if last and (node[j, W_END_TARGET] != 0.0 or ends_on_surface(j, normal, size, node)):
         # rows 2 and 3 of h become the components of Q - B along t_Q and b_Q: a vanishing segment has no direction
-        node[j, W_PIN] = 1.0
+        node[j, W_END_ON_SURFACE] = 1.0
         node[j, W_CQ] = 0.0
         node[j, W_CQ + 1] = -size * along
         node[j, W_CQ + 2] = -size * binormal
-        share = size / (LANDING_SCALE * node[j, SIZE])
+        share = size / (END_DISTANCE_SCALE * node[j, SIZE])
         return share * share * (along * along + binormal * binormal)
     node[j, W_CQ] = along
     node[j, W_CQ + 1] = normal

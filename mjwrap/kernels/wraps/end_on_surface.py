@@ -33,12 +33,12 @@ LOW_END = 0.01  # an end is low where it lies lower above the surface than this,
 NEAR_END = 0.3  # a contact nearer to a low end, in the surface's size, is moved to it
 SHOTS = 36  # geodesics shot from an end
 REFINEMENTS = 4  # of the direction between two of them
-GOOD_MISS = 0.02  # a geodesic that misses the other end by less is polished [rad]
-MOST_MISS_LEFT = 0.3  # and one that misses it by more after all refinements is none
-MOST_DIFFERENCE = 2.5  # neighbours that differ by more do not enclose one that hits
+SMALL_MISS = 0.02  # a geodesic that misses the other end by less is polished [rad]
+MAX_MISS = 0.3  # and one that misses it by more after all refinements is none
+MAX_MISS_CHANGE = 2.5  # neighbours that differ by more do not enclose one that hits
 MARCH_STEP = 0.35  # along a geodesic that is shot, in the surface's size
-MOST_MARCH_STEPS = 20
-MOST_SHOTS = 12
+MAX_MARCH_STEPS = 20
+MAX_SHOT_WAYS = 12
 
 
 @jit
@@ -55,7 +55,7 @@ def polish(k, ends, node, known):
     """
     error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, known)
     # where the row holds this evaluation to the end, a solve that follows need not repeat it
-    node[k, lay.W_FRESH] = error * error
+    node[k, lay.W_WRAP_ERROR] = error * error
     if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and is_local_minimum(k, k + 1, node)):
         return False, 0.0
     return True, node[k, lay.W_L] + node[k, S_ARC] + node[k, lay.W_LQ]
@@ -64,13 +64,13 @@ def polish(k, ends, node, known):
 @jit
 def polish_from_low_ends(k, ends, node, high_a, high_b):
     """Polish a guess whose ends lie high_a and high_b above the surface; return what `polish` does [m]."""
-    reach = NEAR_END * node[k, SIZE]
+    near = NEAR_END * node[k, SIZE]
     if high_a > low_end_height(k, node) and high_b > low_end_height(k, node):
         return polish(k, ends, node, NOT_EVALUATED)
     geodesic(k, node, ends[0], ends[1], ends[2])
     before, behind = _distance_to_end(k, node, W_P, ends, 3), _distance_to_end(k, node, W_Q, ends, 6)
-    from_a = high_a <= low_end_height(k, node) and before <= reach
-    to_b = high_b <= low_end_height(k, node) and behind <= reach
+    from_a = high_a <= low_end_height(k, node) and before <= near
+    to_b = high_b <= low_end_height(k, node) and behind <= near
     if not (from_a or to_b):
         return polish(k, ends, node, NOT_EVALUATED)
     # the guess, in case Newton's method fails with the ends on the surface
@@ -113,10 +113,10 @@ def _polish_on_surface(k, ends, node, from_a, to_b, high_a, high_b):
     """
     _, _, _, _, ax, ay, az = end_onto_surface(k, node, ends, 3, from_a)
     _, _, _, _, bx, by, bz = end_onto_surface(k, node, ends, 6, to_b)
-    node[k, lay.W_LAND] = 1.0 if to_b else 0.0
+    node[k, lay.W_END_TARGET] = 1.0 if to_b else 0.0
     flat = (ends[0], ends[1], ends[2], ax, ay, az, bx, by, bz)
     error, _, _ = newton(k, k + 1, flat, node, LOCAL_TOL, LOCAL_STEPS, NOT_EVALUATED)
-    node[k, lay.W_LAND] = 0.0
+    node[k, lay.W_END_TARGET] = 0.0
     if not (error <= LOCAL_TOL and node[k, S_ARC] > 0.0):
         return False, 0.0
     # an end h above the surface leaves a straight segment about sqrt(2 h / κ) long before the contact
@@ -215,7 +215,7 @@ def _height_over_tangent_plane(k, node, ends, end):
 
 
 @jit
-def _follow_to_sight(k, node, px, py, pz, angle, ends, end):
+def _march_into_sight(k, node, px, py, pz, angle, ends, end):
     """Follow the geodesic that leaves a surface point at an angle, until the string's other end comes into sight.
 
     In sight means over the tangent plane. Returns whether it does, the arc length there [m], and the angle between the
@@ -229,7 +229,7 @@ def _follow_to_sight(k, node, px, py, pz, angle, ends, end):
     node[k, S_ARC] = step
     high = 0.0
     way = 0.0
-    for _ in range(MOST_MARCH_STEPS):
+    for _ in range(MAX_MARCH_STEPS):
         high = _height_over_tangent_plane(k, node, ends, end)
         if high >= 0.0:
             break
@@ -271,20 +271,20 @@ def shoot_geodesics(k, ends, node, side, ways):
     seen, before = False, 0.0
     for i in range(SHOTS + 1):
         angle = i * (2.0 * math.pi / SHOTS)
-        in_sight, _, miss = _follow_to_sight(k, node, px, py, pz, angle, ends, end)
+        in_sight, _, miss = _march_into_sight(k, node, px, py, pz, angle, ends, end)
         # the miss changes its sign between this direction and the one before: one that hits is enclosed
         if (
             in_sight
             and seen
             and miss * before <= 0.0
-            and abs(miss - before) < MOST_DIFFERENCE
-            and count < MOST_SHOTS
+            and abs(miss - before) < MAX_MISS_CHANGE
+            and count < MAX_SHOT_WAYS
         ):
             first, last, low, high = angle - 2.0 * math.pi / SHOTS, angle, before, miss
             for _ in range(REFINEMENTS):  # regula falsi, the Illinois way
                 middle = first + (last - first) * low / (low - high) if low != high else first
-                in_sight, arc, at = _follow_to_sight(k, node, px, py, pz, middle, ends, end)
-                if not in_sight or abs(at) < GOOD_MISS:
+                in_sight, arc, at = _march_into_sight(k, node, px, py, pz, middle, ends, end)
+                if not in_sight or abs(at) < SMALL_MISS:
                     break
                 if at * high > 0.0:
                     last, high = middle, at
@@ -292,7 +292,7 @@ def shoot_geodesics(k, ends, node, side, ways):
                 else:
                     first, low = middle, at
                     high *= 0.5
-            if in_sight and abs(at) < MOST_MISS_LEFT:
+            if in_sight and abs(at) < MAX_MISS:
                 ways[2 * count] = middle
                 ways[2 * count + 1] = arc
                 count += 1

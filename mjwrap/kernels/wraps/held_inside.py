@@ -17,17 +17,17 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, jit
+from mjwrap.kernels.compilation.jit import jit, no_inline
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.vectors import rotate
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
 POS, S_P, W_P, W_Q, W_TP, W_TQ = lay.POS, lay.S_P, lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
-LAST_STEP = 1e-28  # last step, squared, in radii and in the lengths of the segments
-LEAST_STEP = 1e-32  # as far as unit vectors can tell
+LAST_STEP_SQUARE = 1e-28  # last step, squared, in radii and in the lengths of the segments
+LEAST_STEP_SQUARE = 1e-32  # as far as unit vectors can tell
 SMALL_STEP = 1e-3  # step [rad]
 ROUNDING = 4e-16  # of a height over the surface, in radii
-MOST_STEPS = 60  # steps; four are normal, bisection alone takes fifty
+MAX_STEPS = 60  # steps; four are normal, bisection alone takes fifty
 SHORT_SEGMENT = (
     1e-4  # the angle of a shorter segment is judged as one of this length: rounding turns it [radii]
 )
@@ -49,15 +49,18 @@ def _reflection_point(ax, ay, bx, by):
 
     The line from A to B misses the disc.
     """
-    reach_a, reach_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+    distance_a, distance_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
     # P as an unnormalised direction; (lx, ly) and (hx, hy) are the bracket's two ends, A and B at equal distance
     way = 1.0 if ax * by - ay * bx >= 0.0 else -1.0
-    lx, ly, hx, hy = reach_b * ax, reach_b * ay, reach_a * bx, reach_a * by
-    x = (reach_b - 1.0) * ax + (reach_a - 1.0) * bx  # exact where A and B are close in direction
-    y = (reach_b - 1.0) * ay + (reach_a - 1.0) * by
+    lx, ly, hx, hy = distance_b * ax, distance_b * ay, distance_a * bx, distance_a * by
+    x = (distance_b - 1.0) * ax + (distance_a - 1.0) * bx  # exact where A and B are close in direction
+    y = (distance_b - 1.0) * ay + (distance_a - 1.0) * by
     if x == 0.0 and y == 0.0:
         x, y = lx, ly
-    least_a, least_b = 0.5 * (reach_a - 1.0) * (reach_a + 1.0), 0.5 * (reach_b - 1.0) * (reach_b + 1.0)
+    least_a, least_b = (
+        0.5 * (distance_a - 1.0) * (distance_a + 1.0),
+        0.5 * (distance_b - 1.0) * (distance_b + 1.0),
+    )
     steps = 0
     turn = 1.0
     while True:
@@ -77,14 +80,14 @@ def _reflection_point(ax, ay, bx, by):
             hx, hy = x, y
         else:
             lx, ly = x, y
-        noise = reach_b * (abs(along_a) + abs(up_a)) + reach_a * (abs(along_b) + abs(up_b))
-        if abs(sine) <= ROUNDING * noise or steps == MOST_STEPS:
+        noise = distance_b * (abs(along_a) + abs(up_a)) + distance_a * (abs(along_b) + abs(up_b))
+        if abs(sine) <= ROUNDING * noise or steps == MAX_STEPS:
             break
         turn = 0.0
         rate_a, rate_b = 0.5 * square_a + least_a, 0.5 * square_b + least_b
         if cosine > abs(sine):
             turn = -sine * square_a * square_b / (cosine * (rate_a * square_b + rate_b * square_a))
-            if turn * turn <= max(LAST_STEP * min(square_a, square_b, 1.0), LEAST_STEP):
+            if turn * turn <= max(LAST_STEP_SQUARE * min(square_a, square_b, 1.0), LEAST_STEP_SQUARE):
                 break
         elif up_a > 0.0 and up_b > 0.0:
             turn = -sine * up_a * up_b / (rate_a * up_b * up_b + rate_b * up_a * up_a)
@@ -100,7 +103,7 @@ def _reflection_point(ax, ay, bx, by):
 
 
 @jit
-def _free(k, ax, ay, az, bx, by, bz, node):
+def _leave_straight(k, ax, ay, az, bx, by, bz, node):
     """Leave the string straight; return its length [m]."""
     node[k, lay.S_MODE] = lay.FREE
     for i in range(1, lay.STATE):
@@ -156,7 +159,7 @@ def normal(k, x, y, z, node):
     return (x - along * ux) * over, (y - along * uy) * over, (z - along * uz) * over
 
 
-@apart
+@no_inline
 def solve_held_inside(k, ends, node, tol):
     """Find the shortest string from A to B that meets obstacle k's solid; return (status, length, error, steps).
 
@@ -170,15 +173,15 @@ def solve_held_inside(k, ends, node, tol):
     over = 1.0 / radius
     # a sphere: the plane of A, B and the centre, with axes u towards A and w at right angles
     if node[k, lay.INSIDE] == lay.ABOUT_POINT:
-        reach = math.sqrt(ax * ax + ay * ay + az * az)
-        unit = 1.0 / max(reach, 1e-300)
+        distance = math.sqrt(ax * ax + ay * ay + az * az)
+        unit = 1.0 / max(distance, 1e-300)
         ux, uy, uz = ax * unit, ay * unit, az * unit
         along = bx * ux + by * uy + bz * uz
         wx, wy, wz = bx - along * ux, by - along * uy, bz - along * uz
         across = math.sqrt(wx * wx + wy * wy + wz * wz)
-        if _meets_disc(reach * over, 0.0, along * over, across * over):
-            return lay.CONVERGED, _free(k, ax, ay, az, bx, by, bz, node), 0.0, 0
-        c, s, near, far, error, steps = _reflection_point(reach * over, 0.0, along * over, across * over)
+        if _meets_disc(distance * over, 0.0, along * over, across * over):
+            return lay.CONVERGED, _leave_straight(k, ax, ay, az, bx, by, bz, node), 0.0, 0
+        c, s, near, far, error, steps = _reflection_point(distance * over, 0.0, along * over, across * over)
         c, s = radius * c, radius * s / max(across, 1e-300)
         length_a, length_b = radius * near, radius * far
         px, py, pz = c * ux + s * wx, c * uy + s * wy, c * uz + s * wz
@@ -188,7 +191,7 @@ def solve_held_inside(k, ends, node, tol):
     rx, ry, rz = turn_into_frame(node, k, ax, ay, az)
     qx, qy, qz = turn_into_frame(node, k, bx, by, bz)
     if _meets_disc(rx * over, ry * over, qx * over, qy * over):
-        return lay.CONVERGED, _free(k, ax, ay, az, bx, by, bz, node), 0.0, 0
+        return lay.CONVERGED, _leave_straight(k, ax, ay, az, bx, by, bz, node), 0.0, 0
     c, s, near, far, error, steps = _reflection_point(rx * over, ry * over, qx * over, qy * over)
     rise = qz - rz
     level = radius * (near + far)

@@ -24,12 +24,12 @@ S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
 
 COLUMNS = 14  # samples of a section's upper boundary
 BOUNDARY_TOL = 1e-4  # to which a section's boundary is found, in the surface's size
-MOST_LIFTS = 3  # corrections where the way over a section meets more of it
+MAX_HULL_CORRECTIONS = 3  # corrections where the way over a section meets more of it
 HOLLOW_HEIGHT = (
     0.1  # a string that stands off the surface so high, in its size, between two columns bridges a hollow
 )
 AT_A = 1e-4  # a section that begins so near to A, in the surface's size, begins at A
-MOST_CLIMB_STEPS = 60  # steps to a section's boundary
+MAX_BOUNDARY_STEPS = 60  # steps to a section's boundary
 GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # of an arc of an ellipse, for a guess
 
 
@@ -41,7 +41,7 @@ def _boundary_height(node, k, x, y, z, wx, wy, wz, start):
     step = 0.05 * node[k, SIZE]
     h = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
     hi = lo
-    for _ in range(MOST_CLIMB_STEPS):
+    for _ in range(MAX_BOUNDARY_STEPS):
         hi = lo + max(-h, step)
         h = height(node, k, x + hi * wx, y + hi * wy, z + hi * wz)
         if h >= 0.0:
@@ -93,7 +93,7 @@ def _upper_hull(count, size, first, step, top, chain):
 
 
 @jit
-def _pull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
+def _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
     """Sample the section at COLUMNS columns and pull a string over it; return the number of the hull's columns."""
     for i in range(COLUMNS):
         x = first + i * step
@@ -103,7 +103,7 @@ def _pull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first,
             top[i] = _boundary_height(node, k, px, py, pz, wx, wy, wz, 0.0)
     m = _upper_hull(COLUMNS, size, first, step, top, chain)
     # columns that end below the string may have more surface above: take the boundary from the string's height on
-    for _ in range(MOST_LIFTS):
+    for _ in range(MAX_HULL_CORRECTIONS):
         lifted = False
         j = 0
         for i in range(COLUMNS):
@@ -188,10 +188,10 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
     top, chain = memory[0:COLUMNS], memory[COLUMNS : 2 * COLUMNS]
     # the columns stand where the surface can be, at first, then closer together over the hull
     lo, hi = 0.0, size
-    reach = bounding_radius(node, k)
-    if reach < math.inf:
+    bound = bounding_radius(node, k)
+    if bound < math.inf:
         centre = -(ax * ux + ay * uy + az * uz)
-        lo, hi = max(lo, centre - reach), min(hi, centre + reach)
+        lo, hi = max(lo, centre - bound), min(hi, centre + bound)
     m = 0
     first, step = 0.0, 0.0
     for _ in range(2):
@@ -199,7 +199,7 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
             return False
         step = (hi - lo) / (COLUMNS - 2)
         first = deepest - step * math.ceil((deepest - lo) / step)  # one column stands at the deepest point
-        m = _pull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain)
+        m = _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain)
         if m == 0:
             return False
         lo, hi = first + (chain[0] - 1) * step, first + (chain[m - 1] + 1) * step
@@ -257,8 +257,8 @@ def place_contact_on_tube(k, node, x, y, z, tx, ty, tz, angle):
     """Start at the given angle round a torus' tube, where it is nearest to the point (x, y, z)."""
     major, minor = node[k, DIM], node[k, DIM + 1]
     rho = max(math.sqrt(x * x + y * y), 1e-12 * major)
-    reach = (major + minor * math.cos(angle)) / rho
-    place_contact(k, node, reach * x, reach * y, minor * math.sin(angle), tx, ty, tz, 0.0)
+    scale = (major + minor * math.cos(angle)) / rho
+    place_contact(k, node, scale * x, scale * y, minor * math.sin(angle), tx, ty, tz, 0.0)
 
 
 @jit

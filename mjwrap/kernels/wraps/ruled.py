@@ -16,7 +16,7 @@ import numpy as np
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
-from mjwrap.kernels.geometry.winding import TWO_PI, follow, tangents_sweep
+from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
 
 DIM, HINT = lay.DIM, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
@@ -97,7 +97,7 @@ def _hinted(k, node):
 def _sweep(k, node, ax, ay, bx, by):
     """Return the angle that the string sweeps about the axis: the saved branch's, or else the shorter one [rad]."""
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    return sweep if node[k, S_MODE] == lay.COLD else follow(sweep, node[k, S_SWEEP])
+    return sweep if node[k, S_MODE] == lay.COLD else unwrap_angle(sweep, node[k, S_SWEEP])
 
 
 @jit
@@ -207,14 +207,14 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
 
 
 @jit
-def _tangent_ruling(rho, reach):
+def _tangent_ruling(rho, radius):
     """Return the angle between A and the rulings that its tangent planes touch, and its distance from them."""
     if rho <= abs(
-        reach
+        radius
     ):  # inside, or inside the mirrored cone beyond the apex, where no tangent plane exists
-        return (0.0 if reach > 0.0 else math.pi), 0.0
-    root = math.sqrt((rho - reach) * (rho + reach))
-    return math.atan2(root, reach), root
+        return (0.0 if radius > 0.0 else math.pi), 0.0
+    root = math.sqrt((rho - radius) * (rho + radius))
+    return math.atan2(root, radius), root
 
 
 @jit
@@ -226,20 +226,20 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     """
     slope = node[k, DIM + 1]
     cosine, sine = cone_angle(slope)
-    reach_a, reach_b = node[k, DIM] + slope * az, node[k, DIM] + slope * bz
+    radius_a, radius_b = node[k, DIM] + slope * az, node[k, DIM] + slope * bz
     rho_a, rho_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
-    inside = (A_INSIDE if rho_a < INSIDE * reach_a else 0) + (B_INSIDE if rho_b < INSIDE * reach_b else 0)
-    alpha_a, root_a = _tangent_ruling(rho_a, reach_a)
-    alpha_b, root_b = _tangent_ruling(rho_b, reach_b)
+    inside = (A_INSIDE if rho_a < INSIDE * radius_a else 0) + (B_INSIDE if rho_b < INSIDE * radius_b else 0)
+    alpha_a, root_a = _tangent_ruling(rho_a, radius_a)
+    alpha_b, root_b = _tangent_ruling(rho_b, radius_b)
     principal = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     sweep = _sweep(k, node, ax, ay, bx, by)
     if _hinted(k, node):
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
-        reach = max(reach_a, reach_b)
-        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, reach)
-    # along the ruling from the apex: m = reach (sine + cosine^2 / sine) = reach / sine on the surface and off it
-    along_a = max(reach_a, 0.0) / sine if root_a == 0.0 else reach_a / sine
-    along_b = max(reach_b, 0.0) / sine if root_b == 0.0 else reach_b / sine
+        radius = max(radius_a, radius_b)
+        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+    # along the ruling from the apex: m = radius (sine + cosine^2 / sine) = radius / sine on the surface and off it
+    along_a = max(radius_a, 0.0) / sine if root_a == 0.0 else radius_a / sine
+    along_b = max(radius_b, 0.0) / sine if root_b == 0.0 else radius_b / sine
     delta_a, delta_b = math.atan2(root_a, along_a), math.atan2(root_b, along_b)
     # half a turn or more in the development: the straight line from A to B would pass the apex on the wrong side
     arc = abs(sweep) - alpha_a - alpha_b
@@ -255,7 +255,7 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
         return inside
     turn = 1.0 if sweep >= 0.0 else -1.0
     if root_a > 0.0:
-        nx, ny = _contact_normal(ax, ay, reach_a, root_a, turn)
+        nx, ny = _contact_normal(ax, ay, radius_a, root_a, turn)
     else:
         nx, ny = ax / max(rho_a, 1e-300), ay / max(rho_a, 1e-300)
     far_a = math.sqrt(along_a * along_a + root_a * root_a)

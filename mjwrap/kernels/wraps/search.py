@@ -14,11 +14,11 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
-from mjwrap.kernels.geometry.dispatch import dip, project, straight_swept, swept
+from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.traits import branched, hollow
-from mjwrap.kernels.geometry.winding import follow
+from mjwrap.kernels.geometry.winding import unwrap_angle
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED
 from mjwrap.kernels.wraps.end_on_surface import (
     end_onto_surface,
@@ -41,7 +41,7 @@ S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 DIRECTIONS = 12  # half planes around AB
-LEAST_DEPTH = 1e-10  # a segment that dips less below a surface, in its size, is clear of it
+CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
 SAME_BRANCH = 1.0  # difference of swept angles [rad] that is no whole turn
 
 
@@ -50,8 +50,8 @@ def _on_branch(k, node, known, before):
     """Return whether the path of the last evaluation goes round the tube as it did before."""
     if not known:
         return True
-    angle = swept(k, node)
-    return abs(angle - follow(angle, before)) < SAME_BRANCH
+    angle = winding_angle(k, node)
+    return abs(angle - unwrap_angle(angle, before)) < SAME_BRANCH
 
 
 @jit
@@ -61,7 +61,7 @@ def _leave_free(k, node, sweep, low, ax, ay, az, bx, by, bz):
     A large move needs it, to tell on which side of the surface the string was (`span_solver.py`).
     """
     set_free(node, k, sweep)
-    node[k, lay.W_LOW] = low
+    node[k, lay.W_CLEARANCE] = low
     node[k, S_P] = ax
     node[k, S_P + 1] = ay
     node[k, S_P + 2] = az
@@ -92,24 +92,26 @@ def wrap_by_search(k, ends, node, search):
     if mode == TOUCHED:
         for i in range(lay.STATE):
             node[k, lay.W_LAST + i] = node[k, S_MODE + i]
-        good, _ = polish(k, ends, node, GEODESICS_EVALUATED if node[k, lay.W_FRESH] >= 0.0 else NOT_EVALUATED)
+        good, _ = polish(
+            k, ends, node, GEODESICS_EVALUATED if node[k, lay.W_WRAP_ERROR] >= 0.0 else NOT_EVALUATED
+        )
         if good and _on_branch(k, node, branch, before):
-            node[k, S_SWEEP] = swept(k, node) if winds else 0.0
+            node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
             return inside
     dx, dy, dz = bx - ax, by - ay, bz - az
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
-    low, share = dip(node, k, ax, ay, az, bx, by, bz)
-    straight = straight_swept(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
+    low, share = segment_clearance(node, k, ax, ay, az, bx, by, bz)
+    straight = segment_winding_angle(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
     # hooked: clear of the surface in this pose, but wound about the tube by another number of turns
-    hooked = branch and abs(straight - follow(straight, before)) > SAME_BRANCH
+    hooked = branch and abs(straight - unwrap_angle(straight, before)) > SAME_BRANCH
     hinted = mode == COLD and node[k, HINT] > 0.0
-    if low >= -LEAST_DEPTH * node[k, SIZE] and not hooked:
+    if low >= -CLEAR_DEPTH * node[k, SIZE] and not hooked:
         # a hinted side may hold a string that the straight one does not show
         if hinted and hollow(k, node):
             place_contact(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
             good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
             if good:
-                node[k, S_SWEEP] = swept(k, node) if winds else 0.0
+                node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
                 return inside
         _leave_free(k, node, straight, low, ax, ay, az, bx, by, bz)
         return inside
@@ -119,7 +121,7 @@ def wrap_by_search(k, ends, node, search):
             node[k, S_MODE + i] = node[k, lay.W_LAST + i]
         geodesic(k, node, ends[0], ends[1], ends[2])
         return inside
-    clear = low >= -LEAST_DEPTH * node[k, SIZE]
+    clear = low >= -CLEAR_DEPTH * node[k, SIZE]
     _search(
         k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before, clear,
         high_a, high_b,
@@ -185,7 +187,7 @@ def _search(
         if not good or not _on_branch(k, node, branch, before) or (found and total >= best * (1.0 - 1e-12)):
             continue
         found, best, fresh = True, total, j
-        node[k, S_SWEEP] = swept(k, node) if winds else 0.0
+        node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
         for i in range(lay.STATE):
             memory[i] = node[k, S_MODE + i]
         # the nearest to the hint, or to the side that was lost, will do; else the shortest of all
@@ -207,7 +209,7 @@ def _search(
                     continue
                 j += 1
                 found, best, fresh = True, total, j
-                node[k, S_SWEEP] = swept(k, node) if winds else 0.0
+                node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
                 for c in range(lay.STATE):
                     memory[c] = node[k, S_MODE + c]
             j += 1
@@ -215,7 +217,7 @@ def _search(
     # the row still holds the evaluation of the best one where that was the last one tried
     if found and fresh == j:
         return
-    node[k, lay.W_FRESH] = -1.0
+    node[k, lay.W_WRAP_ERROR] = -1.0
     if found or guessed:
         start = 0 if found else lay.STATE
         for i in range(lay.STATE):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import apart, jit
+from mjwrap.kernels.compilation.jit import jit, no_inline
 from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import into_frame, turn_into_frame
@@ -103,7 +103,7 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
 # ----------------------------------------------------------------------------------------- dispatch
 
 
-@apart
+@no_inline
 def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
 

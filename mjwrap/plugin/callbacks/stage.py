@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.coupling.evaluation import evaluate
-from mjwrap.kernels.coupling.wrenches import body_wrenches, put, take_back
+from mjwrap.kernels.coupling.wrenches import add_to_xfrc, body_wrenches, remove_from_xfrc
 from mjwrap.kernels.musculotendon.dynamics import write_states
 from mjwrap.kernels.musculotendon.groups import Timing
 from mjwrap.plugin.callbacks import block as bk
@@ -32,7 +32,7 @@ GROUPS = 31  # actuator groups that options can switch off
 
 @jit
 def _forces(block, data):
-    """Return xfrc_applied and the arrays that `wrenches.put` and `take_back` share."""
+    """Return xfrc_applied and the arrays that `wrenches.add_to_xfrc` and `remove_from_xfrc` share."""
     bodies = word(block + 8 * bk.BODIES)
     return (
         reals(word(data + word(block + 8 * bk.XFRC)), (bodies, 6)),
@@ -62,14 +62,14 @@ def _remove_wrenches(block, data, state):
         for i in range(12):
             state[at + 1 + i] = 0.0
         at += 13
-    take_back(xfrc, others, mine, total, written)
+    remove_from_xfrc(xfrc, others, mine, total, written)
 
 
 @jit
 def _add_wrenches(block, data, state, wrench):
     """Put the wrench into xfrc_applied and note in plugin_state what is there now."""
     xfrc, others, mine, total, written = _forces(block, data)
-    put(xfrc, others, mine, total, written, wrench)
+    add_to_xfrc(xfrc, others, mine, total, written, wrench)
     loaded = ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
     at = state.shape[0] - 13 * loaded.shape[0]
     for j in range(loaded.shape[0]):

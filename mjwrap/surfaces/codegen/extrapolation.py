@@ -35,10 +35,12 @@ def step_text(pairs: Pairs, field: ast.FunctionDef) -> str:
     lengths = [f"length_{name}" for name, _ in pairs]
     start = [f"{even[i]} = {name}\n{odd[i]} = {name} + size * {rates[name]}" for i, name in enumerate(state)]
     doubts = [
-        f"abs(combine(lane, {state.index('a')}, DOUBT))",
-        f"abs(combine(lane, {state.index('r')}, DOUBT)) / (abs(r) + abs(h))",
+        f"abs(combine(lane, {state.index('a')}, ERROR_WEIGHT))",
+        f"abs(combine(lane, {state.index('r')}, ERROR_WEIGHT)) / (abs(r) + abs(h))",
     ]
-    doubts += [f"abs(combine(lane, {state.index(rate)}, DOUBT)) * length_{name}" for name, rate in pairs]
+    doubts += [
+        f"abs(combine(lane, {state.index(rate)}, ERROR_WEIGHT)) * length_{name}" for name, rate in pairs
+    ]
     return f'''@inner
 def step({", ".join([*state, "h", *lengths])}):
     """Return an estimate of the error, and the state after an arc of h [m]; lengths: of the coordinates' units [m]."""

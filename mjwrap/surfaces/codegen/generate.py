@@ -24,7 +24,7 @@ import math
 import numpy as np
 
 from mjwrap.surfaces.codegen.compiled import geodesic_entry, height_entry, inner, project_entry
-from mjwrap.surfaces.codegen.lanes import DOUBT, HALF, LANES, WEIGHT, combine, cosine, sine, stack
+from mjwrap.surfaces.codegen.lanes import ERROR_WEIGHT, HALF, LANES, WEIGHT, combine, cosine, sine, stack
 '''
 _GRADIENT = {"gx": "x", "gy": "y", "gz": "z"}
 _HESSIAN = {"hxx": "xx", "hyy": "yy", "hzz": "zz", "hxy": "xy", "hxz": "xz", "hyz": "yz"}

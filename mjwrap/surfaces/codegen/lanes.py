@@ -10,10 +10,10 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from mjwrap.kernels.compilation.jit import config
-from mjwrap.kernels.geometry.stoermer import DOUBT, INVERSE, LANES, WEIGHT
+from mjwrap.kernels.geometry.stoermer import ERROR_WEIGHT, INVERSE, LANES, WEIGHT
 from mjwrap.surfaces.codegen.compiled import inner
 
-__all__ = ["DOUBT", "HALF", "LANES", "WEIGHT", "combine", "cosine", "sine", "stack"]
+__all__ = ["ERROR_WEIGHT", "HALF", "LANES", "WEIGHT", "combine", "cosine", "sine", "stack"]
 
 HALF = 0.5 * INVERSE  # of a step: a substep of each column
 _ROOM = 21 * LANES  # doubles: the ten numbers of a geodesic twice for each column, and its substep
