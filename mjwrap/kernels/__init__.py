@@ -1,4 +1,4 @@
-"""The physics: float64 arrays in, arrays out; compiled by numba; no MuJoCo, no classes, no input or output.
+"""The numerical core: functions on float64 arrays, compiled by numba; without MuJoCo, classes, input or output.
 
 Rooms, from the top; each may import those below it (`lint-imports` checks that):
 
@@ -8,7 +8,9 @@ Rooms, from the top; each may import those below it (`lint-imports` checks that)
     wraps                      one obstacle between two points
     tangency                   path error and its Jacobian (`path_error.py`), Newton's method, certificate
     geometry | musculotendon   surfaces, geodesics, a segment's clearance (`clearance.py`) | activation, fibre, tendon
+    compilation                how kernels are compiled and linked, and where their machine code is kept
+    array_types                the types of arrays in named groups
     layout                     the columns of a path's rows
 
-docs/derivation.md has the mathematics, and for every equation the function that carries it out.
+docs/derivation.md has the mathematics, and for every equation the function that computes it.
 """

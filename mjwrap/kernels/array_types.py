@@ -1,8 +1,8 @@
-"""Types of arrays in named groups: what a group's fields hold, for readers and for compilers.
+"""Types of the arrays in named groups, for type checkers and for numba.
 
-A group is a `NamedTuple` whose fields are annotated with these. Inside compiled code it costs nothing; at the border
-between Python and compiled code each group costs about 2 us a call, so kernels that Python calls at every step take
-their arrays one by one and make the groups themselves.
+A group is a `NamedTuple` whose fields are annotated with these types. Inside compiled code a group costs nothing. In a
+call from Python each group costs about 2 us, so kernels that Python calls at every step take the arrays one by one and
+make the groups themselves (`coupling/from_python.py`).
 """
 
 from __future__ import annotations
@@ -23,6 +23,6 @@ Number = Annotated[float, types.float64]
 
 
 def compiled_types(group: type) -> tuple[Any, ...]:
-    """Return numba's types of a group's fields, in their order."""
+    """Return the numba types of a group's fields, in order."""
     hints = get_type_hints(group, include_extras=True)
     return tuple(hint.__metadata__[0] for hint in hints.values())

@@ -1,36 +1,35 @@
 """Columns, kinds and codes shared by all kernels: the memory layout of paths.
 
-A chain is an ordered list of nodes between two fixed end points. All that concerns a node stands in one row of one
-float64 array `node` (N, ROW): one argument instead of seven, because numba hands an array on as seven numbers. A row
-holds, in this order:
+A chain is an ordered list of nodes between two fixed end points. All data of a node stand in one row of one float64
+array `node` (N, ROW): one array argument instead of many, as numba passes each array as seven numbers. A row holds, in
+this order:
 
     KIND        VIA, CYLINDER, SPHERE, ...
-    DIM   (4)   what the mathematics of the kind needs, below; lengths in [m]
-    SIZE        length by which steps on the surface are limited, about its smallest radius of curvature [m]
-    TRAITS      what is true of the surface, as a sum of the bits below
+    DIM   (4)   sizes of the surface, as listed at its kind below; lengths in [m]
+    SIZE        about the smallest radius of curvature; limits steps on the surface, and scales tolerances [m]
+    TRAITS      properties of the surface, as a sum of the bits below
     Z_LIMIT     half length along local z beyond which a contact is out of range [m]; infinite where there is none
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
     HINT  (4)   flag (0 or 1), then the hint in S [m]
-    S_... (11)  the saved solution: what a warm start needs, nothing else
+    S_... (11)  the saved solution: all that a warm start needs
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
-    HANDLE      address of data that lie elsewhere, 0 where there are none
+    HANDLE      address of further data of the surface, 0 where there are none
 
-What is read most, KIND to Z_LIMIT, is the row's first cache line.
+The columns KIND to Z_LIMIT, which are read most often, fill the row's first cache line.
 
-The columns of a surface are filled by `mjwrap/surfaces/rows.py` from the surface's class, and by nothing else. Kernels
-ask for traits (`geometry/traits.py`); only `geometry/dispatch.py` and `wraps/single.py` compare kinds.
+Only `mjwrap/surfaces/rows.py` fills the columns of a surface, from the surface's class. Kernels ask for traits
+(`geometry/traits.py`); only `geometry/dispatch.py` and `wraps/single.py` compare kinds.
 
-Several touches. A string may touch a surface with hollows more than once. Such a surface has as many consecutive
-rows as its class says (`touches`), the same in all columns but TOUCH, which numbers them: 0, 1, 2, ... The rows behind
-the first are known by TOUCH > 0. Each row has a saved solution of its own, so a saved branch has one line per row. What
-moves contacts between rows (`spans/lift_off_touchdown.py`) looks at a row and the next one, whatever their numbers. Two
-rows a surface are in use and tested so far; the hint stands in the first.
+Surfaces with several contacts. A string may touch a surface with hollows more than once. Such a surface has as many
+consecutive rows as its class says (`touches`). They are equal in all columns except TOUCH, which counts 0, 1, 2, ...,
+and the S_ and W_ columns: each row has its own saved solution. `spans/lift_off_touchdown.py` moves contacts between a
+row and the next one. So far two rows per surface are used and tested; the hint stands in the first.
 
-Data elsewhere. Addresses and handles stand in float64 columns, which hold every integer below 2**53. A user's surface
-(CUSTOM) keeps the addresses of its three functions in DIM + 1 to DIM + 3. A surface that needs arrays, such as a mesh,
-puts the address or identifier of these into HANDLE; all rows of the surface have the same, and who made the rows keeps
-the arrays alive. Another device has other addresses: its copy of the rows needs its own.
+Addresses. Addresses and handles stand in float64 columns, which hold every integer below 2**53. A user's surface
+(CUSTOM) has the addresses of its three functions in DIM + 1 to DIM + 3. A surface that needs arrays, such as a mesh,
+has their address or identifier in HANDLE, the same in all its rows; the owner of the rows keeps the arrays alive. On
+another device addresses differ, so that a copy of the rows there needs new ones.
 """
 
 KIND = 0
@@ -51,24 +50,18 @@ ELLIPTIC_CYLINDER = 4  # DIM: two semi-axes, infinity for the third
 TORUS = 5  # DIM: major radius, minor radius
 CONE = 6  # DIM: radius at z = 0, slope (radius gained per length along z)
 CAPSULE = 7  # DIM: radius, half length of the cylinder
-CUSTOM = (
-    8  # DIM: radius about the origin that holds it (inf: unbounded), three addresses, see `user_surface.py`
-)
+CUSTOM = 8  # DIM: radius of a sphere about the origin that contains it, or inf; three addresses (`user_surface.py`)
 KINDS = 9  # one more than the largest
 
 # ------------------------------------------------------------------------------ traits of surfaces, as bits
-CLOSED_FORM = (
-    1  # the wrap between two points is known in closed form, `wraps/single.py`; else it is searched for
-)
+CLOSED_FORM = 1  # the wrap between two points has a closed form (`wraps/single.py`); else it is searched for
 BRANCHED = 2  # the side on which a string passes is topological: S_SWEEP holds the angle that it sweeps
 HOLLOW = 4  # a straight segment that is tangent to the surface may enter it elsewhere
-ONE_SIDED = 8  # between two points there is one stable wrap at most, so that a hint or a search is needless
-RANDOM_STARTS = (
-    16  # a cold start may throw strings over it, with hints drawn by chance at SIZE around its origin
-)
-ELLIPSE_SECTIONS = 32  # it is the sphere stretched by DIM along the axes, so that plane sections are ellipses
+ONE_SIDED = 8  # between two points there is at most one stable wrap, so that no hint or search is needed
+RANDOM_STARTS = 16  # a cold start may try hints at random places, at distance SIZE from its origin
+ELLIPSE_SECTIONS = 32  # an ellipsoid with semi-axes DIM, so that plane sections are ellipses
 
-# ------------------------------------------------------------- values of INSIDE: what the solid is round about
+# ------------------------------------- values of INSIDE: the solid inside which a string is held; 0: none
 ABOUT_POINT = 1.0  # a sphere
 ABOUT_AXIS = 2.0  # a cylinder about z
 
@@ -86,11 +79,11 @@ UNKNOWN_SURFACE = 8
 # ------------------------------------------------------------------------ columns of the saved solution
 S_MODE = 24  # COLD, FREE or TOUCHED
 S_SWEEP = 25  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
-S_P = 26  # first contact point P in S (3) [m]; FREE, no closed form: where the straight segment starts
-S_T = 29  # unit tangent at P in S (3); FREE, no closed form: where the straight segment ends [m]; zeros: not known
+S_P = 26  # first contact point P in S (3) [m]; FREE and no closed form: start of the straight segment
+S_T = 29  # unit tangent at P in S (3); FREE and no closed form: end of the straight segment [m], zeros: not known
 S_ARC = 32  # arc length s [m]
-S_BEFORE = 33  # lengths of the straight segments to P and from Q, where the path was found last (2) [m]
-STATE = 11  # how many they are
+S_BEFORE = 33  # lengths of the straight segments to P and from Q in the last path that was found (2) [m]
+STATE = 11  # number of these columns
 
 COLD = -1.0
 FREE = 0.0
@@ -114,32 +107,30 @@ W_CP = 73  # e.t, e.n, e.b at P (3): the last two are rows 0 and 1 of the path e
 W_CQ = 76  # e'.t, e'.n, e'.b at Q (3), for the segment that leaves: the last two are rows 2 and 3 of h
 W_LQ = 79  # length of the segment that leaves [m]
 W_EQ = 80  # its unit vector (3)
-W_Y = 83  # block elimination: solution for the right-hand side, in the end the Newton step d0..d3 (4)
-W_X = 87  # block elimination: solution for the upper coupling (4 x 2)
+W_Y = 83  # block elimination: solution for the right-hand side, at last the Newton step δ0..δ3 (4)
+W_X = 87  # block elimination: solution for the block above the diagonal (4 x 2)
 W_SAVE = 95  # P, t, s before a trial step (7)
 W_OLD = 102  # the saved solution from which the solve started (11)
-W_KMIN = 113  # negative where the normal curvature is negative on the way: a string lifts off there [1/m]
-W_RMIN = 114  # smallest of r over the arc so far: <= 0 behind a conjugate point
-W_ANGLE = 115  # about the axis from P to Q [rad]; torus: how often the hole is passed
-TOUCH = (
-    116  # the row's number among the rows of its surface: 0, then 1, 2, ... where a string may touch it again
+W_KMIN = (
+    113  # negative if the normal curvature is negative somewhere on the way: a string lifts off there [1/m]
 )
+W_RMIN = 114  # smallest ratio of the field r to the arc length on the way; <= 0 behind a conjugate point
+W_ANGLE = 115  # angle about the axis from P to Q [rad]; torus: how many times the geodesic passes the hole
+TOUCH = 116  # number of the row among the rows of its surface, from 0
 W_LAST = 117  # the saved solution before a single wrap (11)
 W_WRAP_ERROR = 128  # ||f||^2 of a single wrap just found and evaluated in this row; -1 where there is none
-W_BEST = 129  # the shortest solution that several cold starts have found (11)
+W_BEST = 129  # the shortest solution of several cold starts (11)
 W_START = 140  # the saved solution from which a solve over a large move started (11)
 W_CLEARANCE = 151  # height of the lowest point of a free string over the surface [m]
 W_START_ERROR = 152  # in a span's first row: ||f||^2 of the contacts from which it started; -1: not evaluated
-W_RESTARTS = (
-    153  # in a span's first row: how often its solve was started anew, by a restart or by continuation
-)
+W_RESTARTS = 153  # in a span's first row: number of restarts and continuations of the last solve
 W_END_ON_SURFACE = (
-    154  # 1 where the path ends on the surface, at Q; rows 2 and 3 of h then hold Q - B; 0 else
+    154  # 1 where the path ends on the surface, at Q: rows 2 and 3 of h then hold Q - B; 0 else
 )
-W_END_TARGET = (
-    155  # 1 while Newton's method moves Q to that end from any distance (`end_on_surface.py`); 0 else
+W_END_TARGET = 155  # 1 while Newton's method moves Q to an end on the surface from any distance; 0 else
+INSIDE = (
+    156  # ABOUT_POINT or ABOUT_AXIS where a string between two fixed points is held inside the solid; 0 else
 )
-INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS where the string is held to the solid, alone between two fixed points; 0 else
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
 ROW = 160  # 20 cache lines

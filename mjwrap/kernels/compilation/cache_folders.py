@@ -1,4 +1,4 @@
-"""Where machine code is kept on the disk: one folder of this user, and in it one for each module and version of it."""
+"""Where machine code is kept: one folder of the user, with one folder in it for each version of each module."""
 
 from __future__ import annotations
 
@@ -22,22 +22,21 @@ from mjwrap.kernels.compilation import folder_owners
 config: Any = numba_config  # its variables, set from the environment, are not known to type checkers
 
 _DAY = 86_400.0  # [s]
-_UNUSED = 30 * _DAY  # versions that nothing has asked for so long are removed
+_UNUSED = 30 * _DAY  # versions that were not used for longer are removed
 _KEPT = 3  # newest versions of a module, kept however old
-_VERSION = re.compile(
-    r"(.+)-[0-9a-f]{16}|[0-9a-f]{16}|.+\.gone-[0-9a-f]{8}"
-)  # the second: of mjwrap 0.1 and before
+# The second form is that of mjwrap 0.1 and before.
+_VERSION = re.compile(r"(.+)-[0-9a-f]{16}|[0-9a-f]{16}|.+\.gone-[0-9a-f]{8}")
 _REFUSED = "mjwrap: no machine code is kept in {}: {}; it is kept in {} instead"
 
 
 @cache
 def base() -> Path:
-    """Return the folder of all machine code, the same one as long as this process lives."""
+    """Return the folder of all machine code; it stays the same as long as this process lives."""
     return find_base()
 
 
 def find_base() -> Path:
-    """Return the best folder for machine code, created and writable; say which ones cannot be trusted."""
+    """Return the best folder for machine code, created and writable; print which folders cannot be trusted."""
     refused: list[tuple[Path, str]] = []
     found = next((folder for folder in _candidates() if _is_fit(folder, refused)), None) or private()
     for folder, reason in refused:
@@ -55,9 +54,8 @@ def _candidates() -> list[Path]:
     else:
         import platformdirs  # takes some milliseconds
 
-        with contextlib.suppress(
-            RuntimeError
-        ):  # a user without a home; older versions return a relative path
+        # a user without a home: newer versions raise, older ones return a relative path
+        with contextlib.suppress(RuntimeError):
             usual = platformdirs.user_cache_path("mjwrap", appauthor=False)
             if usual.is_absolute():
                 found.append(usual)
@@ -69,11 +67,11 @@ def _candidates() -> list[Path]:
 def _is_fit(folder: Path, refused: list[tuple[Path, str]]) -> bool:
     """Return whether machine code can be kept in a folder, made where missing; add to `refused` why it must not."""
     try:
-        reason = folder_owners.objection(folder)  # before anything is made in a place of somebody else's
+        reason = folder_owners.objection(folder)  # before anything is written to a folder of somebody else
         if reason is None:
             make(folder)
             with tempfile.TemporaryFile(dir=folder):
-                reason = folder_owners.objection(folder)  # somebody else may have made it in the meantime
+                reason = folder_owners.objection(folder)  # somebody else may have made it meanwhile
     except OSError:
         return False
     if reason is not None:
@@ -83,14 +81,14 @@ def _is_fit(folder: Path, refused: list[tuple[Path, str]]) -> bool:
 
 @cache
 def private() -> Path:
-    """Return a folder of this process alone, removed with it."""
+    """Return a folder for this process alone, which is removed when the process ends."""
     folder = tempfile.mkdtemp(prefix="mjwrap-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
 
 
 def make(folder: Path) -> None:
-    """Make a folder, and those that contain it, such that only this user can look into the new ones."""
+    """Make a folder and its missing parents, readable by this user only."""
     missing = [way for way in (folder, *folder.parents) if not way.exists()]
     for way in reversed(missing):
         way.mkdir(mode=0o700, exist_ok=True)
@@ -113,7 +111,7 @@ def use(folder: Path) -> None:
 
 
 def prune(new: Path) -> None:
-    """Remove versions of a module not used for long, but for the newest, and what older mjwraps left behind."""
+    """Remove versions of a module that were not used for long, except the newest, and leftovers of older mjwraps."""
     module = _module_of(new.name)
     versions: list[tuple[float, Path]] = []
     with contextlib.suppress(OSError):
@@ -137,17 +135,18 @@ def _module_of(folder: str) -> str | None:
 def _last_use(folder: Path) -> float:
     """Return when a version was last used or added to."""
     dates = [folder.stat().st_mtime]
-    if not _module_of(folder.name):  # older mjwraps wrote to folders in it, and left its own date alone
+    if not _module_of(
+        folder.name
+    ):  # older mjwraps wrote to folders in it, which leaves its own date unchanged
         dates += [below.stat().st_mtime for below in folder.iterdir()]
     return max(dates)
 
 
 def _remove_unused(folder: Path) -> None:
-    """Remove a version unless it was used of late; it goes out of others' sight in one step, then from the disk."""
+    """Remove a version unless it was used lately; it is renamed first, so that no other process sees half of it."""
     with contextlib.suppress(OSError):
-        if (
-            time.time() - _last_use(folder) > _UNUSED
-        ):  # asked last thing: another process may just have begun to use it
+        # checked at the last moment: another process may just have begun to use it
+        if time.time() - _last_use(folder) > _UNUSED:
             gone = folder.with_name(f"{folder.name}.gone-{uuid.uuid4().hex[:8]}")
             folder.rename(gone)
             shutil.rmtree(gone, ignore_errors=True)

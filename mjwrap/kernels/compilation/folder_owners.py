@@ -1,9 +1,9 @@
-"""Whether a folder can hold machine code: loading it runs it, so nobody else may be able to have put it there.
+"""Whether a folder is safe for machine code: loading the code runs it, so that nobody else may be able to write it.
 
-Looked at are the folder, all that contain it, and the links on the way. Root, this user and whoever owns the root
-folder are trusted: inside a container that may be a user without a name here. Folders that a group may write to
-are refused, but for the private group that many systems give to each user. Where anyone may write, as in /tmp,
-the sticky bit has to keep others from replacing what is in there, and the next folder has to be a trusted one's.
+The folder, all folders that contain it, and the links on the way are checked. Trusted owners are root, this user and
+the owner of the root folder, who inside a container may be a user without a name. Folders to which a group may write
+are refused, except for the private group that many systems give to each user. Where anyone may write, as in /tmp, the
+sticky bit has to keep others from replacing files, and the next folder has to belong to a trusted owner.
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ from pathlib import Path
 
 
 def objection(folder: Path) -> str | None:
-    """Return why a folder, there or still to be made, cannot hold machine code; None where it can.
+    """Return why a folder, which need not exist yet, is not safe for machine code; None where it is safe.
 
-    Raises `OSError` where the way to it leads through a file, or cannot be looked at.
+    Raises `OSError` where its path leads through a file, or cannot be read.
     """
-    if os.name == "nt":  # folders of a profile are its user's there; owners and groups are not numbered
+    if (
+        os.name == "nt"
+    ):  # there the folders of a profile belong to its user; owners and groups have no numbers
         return None
     ways = _ways(folder)
     if ways is None:
@@ -29,7 +31,7 @@ def objection(folder: Path) -> str | None:
         try:
             found = os.lstat(way)
         except FileNotFoundError:
-            continue  # made with mode 0700, in a folder that is looked at here
+            continue  # it will be made with mode 0700, in a folder that is checked here
         if found.st_uid not in trusted():
             return f"{way} belongs to user {found.st_uid}"
         if not stat.S_ISDIR(found.st_mode):
@@ -49,7 +51,7 @@ def trusted() -> set[int]:
 
 
 def _ways(folder: Path) -> list[Path] | None:
-    """Return a folder and all folders and links through which it is found; None where links go on and on."""
+    """Return a folder and all folders and links on its path; None where there are too many links."""
     found: dict[Path, None] = {}
     todo = [Path(os.path.abspath(folder)), Path(os.path.realpath(folder))]
     for path in todo:
@@ -63,7 +65,7 @@ def _ways(folder: Path) -> list[Path] | None:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group is this user's own: its main one, of its name, with no other members."""
+    """Return whether a group is private to this user: the main group, of the user's name, without other members."""
     with contextlib.suppress(ImportError, KeyError, OSError):
         import grp
         import pwd

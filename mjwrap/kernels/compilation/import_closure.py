@@ -1,7 +1,7 @@
-"""Which sources the machine code of a module depends on: those that it can reach by imports within this package.
+"""The sources on which the machine code of a module depends: all that it reaches by imports within this package.
 
-Imports are read from the text, wherever they stand: parsing it all would take longer than loading the machine code.
-Where in doubt a source counts: a package bound as a whole counts with all that is in it.
+Imports are found in the text by regular expressions, because parsing all sources would take longer than loading the
+machine code. In doubt a source counts: a package that is imported as a whole counts with everything in it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import NamedTuple
 PACKAGE = "mjwrap"
 _ROOT = Path(__file__).parents[2]
 _ROOM = "mjwrap.kernels.compilation."
-_HOW = (f"{_ROOM}jit", f"{_ROOM}linking")  # they decide how every kernel is compiled
-# These decide only where machine code is kept, or what stands among the circumstances of a key anyway.
+_HOW = (f"{_ROOM}jit", f"{_ROOM}linking")  # decide how every kernel is compiled
+# These decide only where machine code is kept, or something that is part of every key (`circumstances`) anyway.
 _WHERE = {
     f"{_ROOM}{name}"
     for name in (
@@ -36,12 +36,12 @@ _STARTED = time.time()
 
 _BEFORE = re.compile(
     r"(?:^|[;:])[ \t\f]*(?:from\b[ \t]*([.\w \t]+?)[ \t]*)?$"
-)  # the word `import`, in its line
+)  # what stands before the word `import` in its line
 _AFTER = re.compile(r"(?!\w)[ \t]*(\((?:[^)#]|#[^\n]*)*\)|[^\n;#]*)")
 
 
 class Source(NamedTuple):
-    """One file: a hash of its bytes, whether it is as old as this process at least, and what it imports."""
+    """One file: a hash of its bytes, whether it is unchanged since this process began, and what it imports."""
 
     digest: bytes
     unchanged: bool
@@ -51,7 +51,7 @@ class Source(NamedTuple):
 def key(module: str, *circumstances: object) -> str | None:
     """Return 16 hexadecimal digits that change with the circumstances and with all sources that a module reaches.
 
-    None where a source was changed since this process began: what is in memory may then be older than the file.
+    None where a source was changed since this process began: the module in memory may then be older than the file.
     """
     sources = reached(module)
     if module not in sources or not all(source.unchanged for source in sources.values()):
@@ -63,9 +63,10 @@ def key(module: str, *circumstances: object) -> str | None:
 
 
 def reached(module: str) -> dict[str, Source]:
-    """Return the sources that count for a module, by name: it and its imports, theirs, and so on.
+    """Return the sources that count for a module, by name: the module, its imports, their imports, and so on.
 
-    Packages on the way count, without what they import in their turn, but for the outermost one, a list of names.
+    The `__init__.py` of each package on the way counts too, without its own imports. That of mjwrap itself does not: it
+    is only a list of names.
     """
     found: dict[str, Source] = {}
     todo = [module, *_HOW]
@@ -91,13 +92,13 @@ def read(module: str) -> Source | None:
         content, changed = file.read(), os.fstat(file.fileno()).st_mtime
     text = content.decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
     package = module if path.endswith("__init__.py") else module.rpartition(".")[0]
-    # A date in the future is that of a wrong clock, not of an edit.
+    # a date in the future comes from a wrong clock, not from an edit
     unchanged = not _STARTED < changed <= time.time()
     return Source(hashlib.sha256(content).digest(), unchanged, tuple(dict.fromkeys(_imports(text, package))))
 
 
 def forget() -> None:
-    """Read all sources anew: a module has been loaded again."""
+    """Forget all sources that were read; called when a module has been loaded again."""
     read.cache_clear()
     _file.cache_clear()
 
@@ -121,7 +122,7 @@ def _packages_of(module: str) -> Iterator[str]:
 
 
 def _imports(text: str, package: str) -> Iterator[str]:
-    """Yield the names of the modules of mjwrap that a text imports; package: that the text belongs to."""
+    """Yield the names of the modules of mjwrap that a text imports; package: the one to which the text belongs."""
     at = text.find("import")
     while at >= 0:
         before = _BEFORE.search(text[text.rfind("\n", 0, at) + 1 : at])
@@ -144,7 +145,7 @@ def _imported(origin: str | None, listed: str, package: str) -> Iterator[str]:
 
 
 def _names(text: str) -> Iterator[tuple[str, bool]]:
-    """Yield what an import lists, and whether it is given another name."""
+    """Yield the names that an import lists, and whether each is renamed by `as`."""
     if text.startswith("("):
         text = re.sub(r"#[^\n]*|[()]", " ", text)
     for part in text.split(","):
@@ -154,7 +155,7 @@ def _names(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _absolute(origin: str, package: str) -> str:
-    """Return a module's full name; with n leading dots it is sought n - 1 packages above the given one."""
+    """Return a module's full name; n leading dots stand for the package n - 1 levels above the given one."""
     name = origin.lstrip(".")
     level = len(origin) - len(name)
     if not level:
@@ -179,7 +180,7 @@ def _taken(origin: str, names: list[str]) -> Iterator[str]:
 
 
 def _bound(module: str) -> Iterator[str]:
-    """Yield what can be reached by a module's name: with a package, all that is in it."""
+    """Yield what can be reached by a module's name: for a package, everything in it."""
     path = _file(module)
     yield module
     if path and path.endswith("__init__.py"):

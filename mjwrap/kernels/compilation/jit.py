@@ -1,4 +1,4 @@
-"""The one place that decides how kernels are compiled; `module_caches.py` says where the machine code is kept."""
+"""The decorators of kernels, which decide how each is compiled; `module_caches.py` says where machine code is kept."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from mjwrap.kernels.compilation.cache_folders import config
 
 _OURS = "mjwrap.kernels."
 F = TypeVar("F", bound=Callable[..., Any])
-_NOTICE = "mjwrap: compiling its kernels, once for this machine and version ({}) ..."
-_FIRST, _FURTHER = (
-    "about half a minute",
-    "those that nothing has asked for so far; mjwrap warmup compiles all at once",
-)
-# What numba.njit has, too. Where `linking.py` does not fit numba, that is all there is.
+_NOTICE = "mjwrap: compiling its kernels{}, once for this machine and version ..."
+_FIRST = " (about half a minute)"
+_FURTHER = " that were not used before ('mjwrap warmup' compiles all of them)"
+# The options of `linking.py` that numba.njit has too, for a numba with which `linking.py` does not work.
 _PLAIN: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "cache": True}
 
 
@@ -45,9 +43,9 @@ event.register("numba:compile", _Announcer())
 
 
 def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
-    """Compile a kernel: no GIL, IEEE semantics but for fused multiply-adds, machine code kept on disk.
+    """Compile a kernel: without the GIL, IEEE arithmetic with fused multiply-adds, machine code kept on disk.
 
-    One whose name begins with an underscore cannot be called from Python, which makes it cheaper to compile.
+    A kernel whose name begins with an underscore cannot be called from Python, which makes it cheaper to compile.
     """
     if config.DISABLE_JIT:
         return function
@@ -55,7 +53,7 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
         with module_caches.kept(function):
             plain: Any = numba.njit(**_PLAIN)(function)
         return plain
-    from mjwrap.kernels.compilation import linking  # of parts that another numba may lack
+    from mjwrap.kernels.compilation import linking  # uses inner parts of numba that another version may lack
 
     if function.__name__.startswith("_"):
         kind, options = "Hidden", options | {"no_cpython_wrapper": True}
@@ -66,15 +64,15 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
 
 
 def no_inline(function: F) -> F:
-    """Compile a kernel whose code callers do not take over: a large one, to which a call is nothing."""
+    """Compile a kernel whose code is not copied into its callers: for large kernels, where a call costs little."""
     return jit(function, "NotInlined")
 
 
 def allocating(function: F) -> F:
-    """Compile a kernel that makes arrays of its own."""
+    """Compile a kernel that allocates arrays."""
     return jit(function, _nrt=True)
 
 
 def inlined(function: F) -> F:
-    """Compile a kernel that every caller takes over: a small one, called with constants."""
+    """Compile a kernel whose code is copied into every caller: for small kernels, called with constants."""
     return jit(function, forceinline=True)

@@ -1,8 +1,9 @@
-"""How a kernel is compiled for its callers: once for every set of types, and, where wished, apart from them.
+"""How compiled kernels call each other: one version for each set of types, linked by symbols where the kernel is large.
 
-numba compiles a function anew for every constant argument, and puts the machine code of all that it calls, directly or
-not, into its own, optimised once more at every level. Kernels do without the first; the large ones do without the
-second: their callers hold a call of a symbol, which is given an address where the callee is compiled or loaded.
+numba compiles a function anew for every constant argument. It also copies the machine code of everything that a
+function calls, directly or not, into the function's own, and optimises it again at every level. Kernels are never
+compiled anew for a constant argument. The code of a large kernel (`NotInlined`) is not copied: its callers contain a
+call of a symbol, whose address is set where the kernel is compiled or loaded.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ OPTIONS: dict[str, Any] = {
 
 
 class Kernel(Dispatcher):
-    """A compiled function. Constants among its arguments count as values of their type."""
+    """A compiled function. A constant argument counts as any value of its type."""
 
     def __init__(self, function: Any, options: dict[str, Any]) -> None:
         super().__init__(py_func=function, locals={}, targetoptions=options, pipeline_class=Compiler)
@@ -43,30 +44,30 @@ class Kernel(Dispatcher):
         )
 
     def add_overload(self, cres: Any) -> None:
-        """Enter a compiled or loaded version; what has to be loaded with it has to be with its callers, too."""
+        """Add a compiled or loaded version; its callers load what it needs loaded."""
         cres.library._reload_init.update(cres.reload_init)
         super().add_overload(cres)
 
 
 class Hidden(Kernel):
-    """A compiled function that only compiled functions call: without the wrapper through which Python would."""
+    """A compiled function for compiled callers only: without the wrapper through which Python calls."""
 
     def __call__(self, *args: Any) -> Any:
-        """Say what to do instead."""
+        """Raise an error that says what to do instead."""
         raise TypeError(
             f"{self.py_func.__name__} can be called from compiled kernels only; use its `py_func`"
         )
 
 
 class NotInlined(Kernel):
-    """A compiled function whose code is not copied into its callers'."""
+    """A compiled function whose code is not copied into its callers."""
 
     def __init__(self, function: Any, options: dict[str, Any]) -> None:
         super().__init__(function, options)
         self._calls: dict[Any, object] = {}
 
     def get_overload(self, sig: Any) -> Any:
-        """Return what stands for a version in compiled code: a call of its symbol."""
+        """Return what stands in compiled code for this version: a call of its symbol."""
         args = tuple(sigutils.normalize_signature(sig)[0])
         if args not in self._calls:
             cres, key = self.overloads[args], object()
@@ -80,14 +81,14 @@ class NotInlined(Kernel):
 
 
 def _load(module: str, name: str, args: Any) -> None:
-    """Give the symbol of a version its address: before machine code is loaded that calls it."""
+    """Set the address of a version's symbol; runs before machine code that calls the symbol is loaded."""
     kernel = getattr(importlib.import_module(module), name)
     kernel.compile(args)
     kernel.get_overload(args)
 
 
 def _call(fndesc: Any, symbol: str, load: Any) -> Any:
-    """Return what writes the call of a version by its symbol; `load` goes with the machine code of the caller."""
+    """Return the function that generates a call by symbol; `load` is stored with the machine code of the caller."""
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         context.active_code_library._reload_init.add(load)

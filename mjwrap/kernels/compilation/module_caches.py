@@ -1,8 +1,8 @@
-"""Where the machine code of each module is kept, and when it is out of date.
+"""The folder in which the machine code of each module is kept, named such that outdated code is never found.
 
-numba asks whether the file of a function has changed, which tells nothing of those that it calls. The folder of a
-module is named by all sources that count for it instead. Where the package lies does not count: copies share machine
-code.
+numba checks only whether the file of a function has changed, not the files of the functions that it calls. Here the
+name of a module's folder contains a hash over all sources that count for the module (`import_closure.py`). The place of
+the package does not count: copies of it share machine code.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from mjwrap.kernels.compilation.cache_folders import config
 
 
 class Place(NamedTuple):
-    """Where the machine code of a module is kept, and what its index files have to carry to be up to date."""
+    """The folder of a module's machine code, and the stamp that its index files carry if they are up to date."""
 
     folder: Path
     stamp: str
 
 
-# Of modules, with the `__spec__` that each had: a new one when it is loaded again.
+# The place of each module, with the `__spec__` that the module had: it is another one after a reload.
 _places: dict[str, tuple[object, Place]] = {}
 
 
 def circumstances() -> tuple[object, ...]:
-    """Return what machine code depends on, but for sources."""
+    """Return what machine code depends on besides the sources."""
     bounds = os.environ.get("NUMBA_BOUNDSCHECK", "0")
     return numba.__version__, tuple(sys.version_info[:2]), bounds, self_test.is_plain()
 
 
 def keep(module: str, file: Path) -> None:
-    """Have the machine code of a module outside this package kept beside its file, for as long as that is the same."""
+    """Keep the machine code of a module of another package beside its file, valid while the file is unchanged."""
     _places[module] = None, Place(file.parent, hashlib.sha256(file.read_bytes()).hexdigest()[:16])
 
 
 def place(function: Callable[..., Any]) -> Place | None:
-    """Return where the machine code of a function is kept, None where it is not this package's."""
+    """Return where the machine code of a function is kept; None for a function of another package."""
     module, spec = function.__module__ or "", function.__globals__.get("__spec__")
     before, known = _places.get(module, (None, None))
     if module.startswith(f"{import_closure.PACKAGE}.") and (known is None or before is not spec):
@@ -59,13 +59,13 @@ def place(function: Callable[..., Any]) -> Place | None:
 
 
 def new_place(module: str, name: str = "") -> Place:
-    """Return where the machine code of a module is kept that has just been loaded, and note that this is in use.
+    """Return where the machine code of a module that was just loaded is kept, and note that the folder is in use.
 
-    name: of what is kept there, where that is not the module itself.
+    name: begins the folder's name, where that is not the module's.
     """
     name = name or module
     version = import_closure.key(module, *circumstances())
-    if version is None:  # edited since this process began: its code is for this process alone
+    if version is None:  # edited since this process began: its machine code is for this process alone
         stamp = uuid.uuid4().hex[:16]
         return Place(cache_folders.private() / f"{name}-{stamp}", stamp)
     folder = cache_folders.base() / f"{name}-{version}"
@@ -80,7 +80,7 @@ def is_anything_kept() -> bool:
 
 @cache
 def _is_located() -> bool:
-    """Return whether numba asks `cache_locator.py`, whose base class a version to come may lack."""
+    """Return whether numba uses `cache_locator.py`; a future version may lack the base class that it needs."""
     try:
         importlib.import_module("mjwrap.kernels.compilation.cache_locator")
     except (ImportError, AttributeError):
@@ -90,7 +90,7 @@ def _is_located() -> bool:
 
 @contextlib.contextmanager
 def kept(function: Callable[..., Any]) -> Iterator[None]:
-    """Have the machine code of a function, decorated inside the block, kept in its place."""
+    """Keep the machine code of a function that is decorated inside the block in the folder of its module."""
     found = place(function)
     if found is None:
         yield
@@ -101,12 +101,12 @@ def kept(function: Callable[..., Any]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def kept_in(folder: Path) -> Iterator[None]:
-    """Have machine code kept in a folder by numba's own setting, where it cannot be told by a locator."""
+    """Keep machine code in a folder by numba's own setting, where numba does not use the locator."""
     if _is_located():
         yield
         return
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(folder)  # read when the function is decorated
+    config.CACHE_DIR = str(folder)  # numba reads it when the function is decorated
     try:
         yield
     finally:

@@ -1,4 +1,4 @@
-"""Three small kernels that show whether numba links and keeps functions as `linking.py` takes it to."""
+"""Three small kernels that show whether numba links and stores functions in the way that `linking.py` relies on."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _combine(x):
     return multiply(x, 2) + multiply(x, 3) + shift(x)
 
 
-# Names of the module, under which `linking.py` looks them up.
+# `linking.py` looks them up by these names.
 multiply = linking.NotInlined(_multiply, linking.OPTIONS)
 shift = linking.Hidden(_shift, linking.OPTIONS | {"no_cpython_wrapper": True})
 combine = linking.Kernel(_combine, linking.OPTIONS)
@@ -32,7 +32,7 @@ _multiply.__qualname__ = "multiply"
 
 
 def passes() -> bool:
-    """Return whether calls by a symbol, constants as arguments and machine code from a file do what they should."""
+    """Return whether calls by symbol, constant arguments and stored machine code work as expected."""
     if combine(1.5) != 10.0 or len(multiply.overloads) != 1:
         return False
     (compiled,) = combine.overloads.values()

@@ -1,7 +1,8 @@
-"""Whether numba is one on which `linking.py` can build; where it is not, kernels are plain numba functions.
+"""Test whether `linking.py` works with the installed numba; where it does not, kernels are plain numba functions.
 
-What `linking.py` builds on is no public part of numba. Versions that the tests ran with are taken as they are; any
-other has to compile, keep and load three small functions once, which takes a second. The verdict is kept on the disk.
+`linking.py` uses inner parts of numba, which may change in any release. Releases with which mjwrap was tested are
+accepted. Any other release has to compile, store and load three small functions (`probe.py`), once, which takes about
+a second. The result is kept on the disk.
 """
 
 from __future__ import annotations
@@ -19,16 +20,16 @@ from mjwrap.kernels.compilation import cache_folders
 
 TESTED = ("0.65", "0.66", "0.67", "0.68")  # by `benchmarks/numba_versions.py`
 _PASSED, _FAILED, _BEGUN = "passed", "failed", "begun"
-_PATIENCE = 60.0  # [s] after which a process that began is taken to have crashed
+_PATIENCE = 60.0  # [s] a test that began longer ago and left no result has crashed
 _NOTICE = (
-    "mjwrap: numba {} links compiled functions in another way than the versions that mjwrap is tested with; "
+    "mjwrap: numba {} differs internally from the versions that mjwrap is tested with; "
     "kernels are compiled by numba.njit alone, which takes longer"
 )
 
 
 @cache
 def is_plain() -> bool:
-    """Return whether kernels are compiled by numba.njit alone: on request, or because numba is not as expected."""
+    """Return whether kernels are compiled by numba.njit alone: on request, or because numba failed the test."""
     if os.environ.get("MJWRAP_PLAIN_NJIT", "0") not in ("", "0"):
         return True
     if (
@@ -43,14 +44,14 @@ def is_plain() -> bool:
 
 
 def passes(base: Path) -> bool:
-    """Return whether this numba passes; a verdict is read from a folder, or found and written to it."""
+    """Return whether this numba passes the test; the result is read from a folder, or found and written there."""
     python = f"py{sys.version_info[0]}{sys.version_info[1]}"
     path = base / f"numba-{numba.__version__}-{python}-{_probed()}.txt"
     with contextlib.suppress(OSError):
         verdict, age = path.read_text(), time.time() - path.stat().st_mtime
         if verdict in (_PASSED, _FAILED):
             return verdict == _PASSED
-        if age > _PATIENCE:  # it ended inside numba
+        if age > _PATIENCE:  # the test crashed inside numba
             return False
     _write(path, _BEGUN)
     verdict = _PASSED if _try() else _FAILED
@@ -59,7 +60,7 @@ def passes(base: Path) -> bool:
 
 
 def _probed() -> str:
-    """Return a hash over what is tried: a new version of it is tried anew."""
+    """Return a hash of the sources of the test: a changed test runs again."""
     import hashlib
 
     files = [Path(__file__).with_name(name) for name in ("linking.py", "probe.py")]
@@ -67,7 +68,7 @@ def _probed() -> str:
 
 
 def _try() -> bool:
-    """Return whether the small functions find what they should; whatever goes wrong inside numba is a no."""
+    """Return whether the small functions give the expected results; an exception inside numba means no."""
     try:
         from mjwrap.kernels.compilation import probe
 
@@ -77,7 +78,7 @@ def _try() -> bool:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file in one go; without one, the next process tries again."""
+    """Write a file in one step; where that fails, the next process runs the test again."""
     with contextlib.suppress(OSError):
         part = path.with_suffix(f".{os.getpid()}")
         part.write_text(text)

@@ -14,7 +14,7 @@ from mjwrap.kernels.spans.end_inside import has_valid_length
 
 @inlined
 def _append(out, count, x, y, z):
-    """Append a point where there is room; return the new count."""
+    """Append a point if there is room for it; return the new count."""
     if count < out.shape[0]:
         out[count, 0], out[count, 1], out[count, 2] = x, y, z
     return count + 1
@@ -52,7 +52,7 @@ def route_contacts(c, routes, node, seg, seg_count, out, count):
 
 @jit
 def _begin(muscle, last, count, starts):
-    """Write that the muscles after `muscle` up to `last` begin at row `count` to starts; return the last one."""
+    """Write `count` to starts for the muscles after `muscle` up to `last`; return the last one."""
     while muscle < last:
         muscle += 1
         starts[muscle] = count
@@ -61,11 +61,11 @@ def _begin(muscle, last, count, starts):
 
 @jit
 def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
-    """Write the points of all paths to out and where each muscle begins to starts (n + 1,); return how many.
+    """Write the points of all paths to out, and each muscle's first row to starts (n + 1,); return how many points.
 
-    only: one muscle's index, or -1 for all. A row of NaN stands between routes joined by pulleys, where no line is.
-    Routes without a path at the last evaluation are drawn along the segments that they hold. Where `out` is too short
-    the points are counted and not written. World frame [m].
+    only: one muscle's index, or -1 for all. Routes that pulleys join are separated by a row of NaN. Routes that had no
+    path at the last evaluation are drawn along their last segments. Points for which `out` is too short are counted but
+    not written. World frame [m].
     """
     count = 0
     muscle = -1

@@ -1,4 +1,4 @@
-"""One evaluation of all muscles of a model: paths, activations, tensions, and wrenches on bodies."""
+"""One evaluation of all muscles of a model: paths, activations, tensions and wrenches on bodies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mjwrap.kernels.musculotendon.dynamics import drive_muscles, read_states
 
 @no_inline
 def evaluate(routes, muscles, poses, inputs, timing, tol, paths, start, states, wrench):
-    """Find all paths, tensions and body wrenches at the given poses; return whether some muscle has no path.
+    """Compute paths, tensions and body wrenches of all muscles; return whether some muscle has no path.
 
     Groups: `Routes`, `Muscles`, `Poses`, `Inputs`, `Timing`, `Paths`, `StepStart`, `MuscleStates`. tol: largest
     tangency error of a path. wrench (nbody, 6): in the convention of `xfrc_applied`.

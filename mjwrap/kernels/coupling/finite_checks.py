@@ -1,4 +1,4 @@
-"""Small checks on whole arrays that every step needs."""
+"""Checks for numbers that are not finite, made at every step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Named groups of the arrays that all muscles' paths are computed from and written to.
+"""Named groups of the arrays with the inputs and results of all muscles' paths.
 
 Arrays named as in MuJoCo's mjData and mjModel have their shapes and frames.
 """
@@ -19,7 +19,7 @@ class Routes(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """Where MuJoCo has sites, geoms and bodies, and how they move."""
+    """Positions and velocities of sites, geoms and bodies, from MuJoCo."""
 
     site_xpos: FloatRows  # (nsite, 3)
     geom_xpos: FloatRows  # (ngeom, 3)
@@ -31,7 +31,7 @@ class Poses(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """Paths as solved: what a warm start needs, straight segments, and how each search ended."""
+    """Solved paths: rows of nodes for the next warm start, straight segments, and results for each route."""
 
     node: FloatRows  # (N, ROW), see `layout.py`
     segments: FloatRows  # (N + C, SEGMENT), see `solved/segments.py`
@@ -40,9 +40,9 @@ class Paths(NamedTuple):
 
 
 class Dofs(NamedTuple):
-    """MuJoCo's tree of degrees of freedom, and how each moves."""
+    """MuJoCo's tree of degrees of freedom and their motion axes."""
 
-    last_dof: Ints  # (nbody,) the last dof that moves a body, -1 where none does
+    last_dof: Ints  # (nbody,) the last dof that moves a body, -1 if there is none
     parent: Ints  # (nv,) dof_parentid
     body_rootid: Ints  # (nbody,)
     cdof: FloatRows  # (nv, 6)
@@ -50,15 +50,17 @@ class Dofs(NamedTuple):
 
 
 class Transmissions(NamedTuple):
-    """Actuators, and tendons that show the same path, that take their lengths and moments from muscles' paths."""
+    """MuJoCo's own actuators, and their tendons, that get length, velocity and moment from mjwrap's paths."""
 
-    output: Ints  # (n,) the actuator's row in rownnz, rowadr and moment; -1 for a muscle that pulls otherwise
-    tendon: Ints  # (n,) the tendon that shows the path too, -1 where none
-    tendon_row: Ints  # (n,) where its row begins in ten_j
+    output: (
+        Ints  # (n,) the actuator's row in rownnz, rowadr and moment; -1 for a muscle that applies wrenches
+    )
+    tendon: Ints  # (n,) the tendon that gets the path's length and Jacobian too, -1 if there is none
+    tendon_row: Ints  # (n,) start of the tendon's row in ten_j
     gear: FloatRows  # (outputs, 6)
     actuator_length: Floats
     actuator_velocity: Floats
-    rownnz: Indices  # of the sparse moment, whose columns hold every dof that changes the path
+    rownnz: Indices  # of the sparse moment, whose columns contain every dof that changes the path
     rowadr: Indices
     colind: Indices
     moment: Floats

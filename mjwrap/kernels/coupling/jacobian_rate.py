@@ -1,8 +1,8 @@
-"""How fast the length Jacobian of every muscle changes along a motion: paths' Hessians and MuJoCo's kinematics joined.
+"""Time derivative of the length Jacobian of every muscle, from the Hessians of paths and MuJoCo's kinematics.
 
-dl/dq of a muscle is the sum over its slots (origin, nodes, insertion) of the path's gradient, a force f and a moment m
-about the slot's place p, on the columns of that place's own Jacobian. Both factors have a rate. Arrays named as in
-mjData and mjModel have their shapes and frames.
+dl/dq of a muscle is a sum over its slots (origin, nodes, insertion): the gradient of the length, a force f and a moment
+m about the slot's position p, times the Jacobian of that position. By the product rule both factors are differentiated.
+Arrays named as in mjData and mjModel have their shapes and frames.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mjwrap.kernels.solved.hessian import NO_FAULT, add_gradient, add_stiffness_
 
 @jit
 def _slot(c, k, routes, links, site_xpos, node):
-    """Return body and place of slot k of route c."""
+    """Return body and position of slot k of route c."""
     lo, hi = routes[c, R_LO], routes[c, R_HI]
     if k == 0 or k == hi - lo + 1:
         site = routes[c, R_FROM] if k == 0 else routes[c, R_TO]
@@ -35,8 +35,8 @@ def _slot(c, k, routes, links, site_xpos, node):
 
 
 @jit
-def _turning(dof, dof_bodyid, dof_is_quat, cvel, cdof, cdof_dot):
-    """Return the rate of a column of cdof; those of ball and free joints turn with the body itself."""
+def _axis_rate(dof, dof_bodyid, dof_is_quat, cvel, cdof, cdof_dot):
+    """Return the rate of a column of cdof; the axes of ball and free joints rotate with the body."""
     if not dof_is_quat[dof]:
         return (
             cdof_dot[dof, 0], cdof_dot[dof, 1], cdof_dot[dof, 2],
@@ -59,7 +59,7 @@ def _turning(dof, dof_bodyid, dof_is_quat, cvel, cdof, cdof_dot):
 
 @jit
 def _add_row(weight, k, place, body, gradient, rate, twist, kinematics, row, jacobian):
-    """Add to a row what slot k contributes, up the chain of dofs that move its body."""
+    """Add slot k's part to a row, up the chain of dofs that move its body; place: from the tree's centre of mass."""
     (
         body_dofadr, body_dofnum, dof_parentid, body_parentid, dof_bodyid, dof_is_quat, _,
         cvel, cdof, cdof_dot, _,
@@ -84,7 +84,7 @@ def _add_row(weight, k, place, body, gradient, rate, twist, kinematics, row, jac
             + rate[k, 4] * ay
             + rate[k, 5] * az
         )
-        bx, by, bz, lx, ly, lz = _turning(dof, dof_bodyid, dof_is_quat, cvel, cdof, cdof_dot)
+        bx, by, bz, lx, ly, lz = _axis_rate(dof, dof_bodyid, dof_is_quat, cvel, cdof, cdof_dot)
         total += (
             fx * (lx + by * rz - bz * ry + ay * vz - az * vy)
             + fy * (ly + bz * rx - bx * rz + az * vx - ax * vz)
@@ -103,7 +103,7 @@ def length_jacobian_rate(
 ):
     """Write d(dl/dq)/dt (n, nv) of every muscle along the motion that cvel and cdof_dot belong to.
 
-    kinematics: what mjModel and mjData know, see `_add_row`. twist, gradient, rate (longest chain + 2, 6) and stop
+    kinematics: arrays of mjModel and mjData, see `_add_row`. twist, gradient, rate (longest chain + 2, 6) and stop
     (longest chain + 2, POINT_ROW) are scratch; owner: 0, 1, 2 ..., a slot for each node. Returns (NO_FAULT, 0, 0), or
     fault, route and slot where there is no derivative.
     """

@@ -1,7 +1,7 @@
-"""How the lengths of muscles change with the generalised coordinates: rows of dl/dq, and moments of actuators.
+"""Length Jacobian dl/dq of muscles, and length, velocity and moment for MuJoCo's own actuators (native transmission).
 
-A straight segment of a string is changed only by the degrees of freedom that move one of its ends and not the other,
-so both ends' chains of dofs are followed up to where they meet. Arrays named as in MuJoCo's mjData and mjModel have
+Only degrees of freedom that move one end of a straight segment and not the other change its length. So the chains of
+dofs of both ends are followed up to the dof at which they meet. Arrays named as in MuJoCo's mjData and mjModel have
 their shapes and frames; `groups.py` has the groups of arrays.
 """
 
@@ -44,7 +44,7 @@ def add_row(c, routes, paths, dofs, row):
 
 @jit
 def length_jacobian(routes, paths, dofs, jacobian):
-    """Write dl/dq (n, nv) of every muscle, all coordinates in one pass over the straight segments."""
+    """Write dl/dq (n, nv) of every muscle, in one pass over the straight segments."""
     for m in range(jacobian.shape[0]):
         for i in range(jacobian.shape[1]):
             jacobian[m, i] = 0.0
@@ -54,10 +54,10 @@ def length_jacobian(routes, paths, dofs, jacobian):
 
 @jit
 def write_transmissions(routes, paths, dofs, length, velocity, targets, row):
-    """Give the actuators of muscles length [m], velocity [m/s] and moment along mjwrap's paths, times their gear.
+    """Write length [m], velocity [m/s] and moment of mjwrap's paths, times the gear, to MuJoCo's own actuators.
 
-    length, velocity (n,): of the muscles. row (nv,): scratch, zeros before and after. A muscle without a path has its
-    last good length, velocity and segments, and what is not finite counts as zero.
+    length, velocity (n,): those of the muscles. row (nv,): scratch, zeros before and after. A muscle without a path has
+    its last valid length, velocity and segments. Where some number is not finite, all of the actuator's are zero.
     """
     rownnz, colind, moment, ten_j = targets.rownnz, targets.colind, targets.moment, targets.ten_j
     c = 0

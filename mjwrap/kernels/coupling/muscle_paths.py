@@ -1,7 +1,7 @@
-"""All muscles of a model in one compiled call: poses and velocities in, paths, lengths and their rates out.
+"""Paths of all muscles of a model in one compiled call: from poses and velocities to paths, lengths and speeds.
 
-`groups.py` has the groups of arrays. A muscle has one or more routes (chains of nodes); several are joined by pulleys
-and enter with their weights.
+`groups.py` has the groups of arrays. A muscle has one route (a chain of nodes), or several that pulleys join; then each
+counts with its weight.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from mjwrap.kernels.spans.end_inside import has_valid_length, list_pulling_segme
 
 # columns of `links` (N, 4): ids of a node's site, geom, hint site (-1 where none) and body
 L_SITE, L_GEOM, L_HINT, L_BODY = 0, 1, 2, 3
-# columns of a row of routes (C, 8): first node, past the last node, origin and insertion site and their bodies, muscle,
-# and how many nodes are surfaces' rows
+# columns of a row of routes (C, 8): first node, one behind the last node, origin and insertion site, their bodies, the
+# muscle, and the number of nodes that are rows of surfaces
 R_LO, R_HI, R_FROM, R_TO, R_FROM_BODY, R_TO_BODY, R_MUSCLE, R_SURFACES = 0, 1, 2, 3, 4, 5, 6, 7
 ROUTE = 8
 
@@ -55,7 +55,7 @@ def _write_poses(lo, hi, links, poses, node):
 
 @jit
 def _roll_back(lo, hi, cold, node):
-    """After a pose without a path: go on from the last solution, or start cold where there is none to go on from."""
+    """Restore the last solution after a pose without a path; cold: make the next start a cold one."""
     for k in range(lo, hi):
         if cold:
             node[k, lay.S_MODE] = lay.COLD
@@ -66,7 +66,7 @@ def _roll_back(lo, hi, cold, node):
 
 @jit
 def end_body(rows, links, c, index):
-    """Return the body that holds a segment's end: a node's, or the origin's or insertion's of route c."""
+    """Return the body of a segment's end: that of a node, or of the origin or insertion of route c."""
     if index < rows[c, R_LO]:
         return rows[c, R_FROM_BODY]
     if index >= rows[c, R_HI]:
@@ -76,7 +76,7 @@ def end_body(rows, links, c, index):
 
 @jit
 def segment_bodies(c, j, routes, row):
-    """Return the bodies that hold the near and the far end of segment j of route c, whose row is given."""
+    """Return the bodies of the near and the far end of segment j of route c; row: the segment's row."""
     near, far = j - c - 1, j - c
     if routes.rows[c, R_SURFACES] > 0:
         near, far = int(row[G_NEAR]), int(row[G_FAR])
@@ -85,7 +85,7 @@ def segment_bodies(c, j, routes, row):
 
 @jit
 def moment(row, column, centre):
-    """Return r x e of a segment, where r is its end in columns `column` from a tree's centre of mass [m]."""
+    """Return r x e of a segment; r: from a tree's centre of mass to the end in columns `column` [m]."""
     rx, ry, rz = row[column] - centre[0], row[column + 1] - centre[1], row[column + 2] - centre[2]
     ex, ey, ez = row[G_E], row[G_E + 1], row[G_E + 2]
     return ry * ez - rz * ey, rz * ex - rx * ez, rx * ey - ry * ex
@@ -93,7 +93,7 @@ def moment(row, column, centre):
 
 @jit
 def _end_speed(velocity, row, mx, my, mz):
-    """Return e . v of a body's point, about which e has the moment m; velocity: the body's row of cvel."""
+    """Return e . v of a segment's end; velocity: its body's row of cvel, m: the moment r x e of `moment`."""
     return (row[G_E] * velocity[3] + row[G_E + 1] * velocity[4] + row[G_E + 2] * velocity[5]) + (
         mx * velocity[0] + my * velocity[1] + mz * velocity[2]
     )
@@ -101,9 +101,9 @@ def _end_speed(velocity, row, mx, my, mz):
 
 @jit
 def _segment_speed(row, near, far, curved, poses):
-    """Return how fast the segment in a row lengthens, whose ends two bodies hold [m/s].
+    """Return the lengthening speed of a segment between bodies near and far [m/s].
 
-    curved: its ends may lie on surfaces, where e need not be along a segment that vanishes.
+    curved: its ends may lie on surfaces; then e need not be parallel to the segment, if it has no length.
     """
     root = poses.body_rootid[far]
     mx, my, mz = moment(row, G_B, poses.subtree_com[root])
@@ -128,7 +128,7 @@ def _curved_speed(c, routes, poses, paths):
 
 @jit
 def _solve_straight(c, routes, poses, paths):
-    """Find the path of route c over via points alone; one whose points are not finite has no segments."""
+    """Find the path of route c, which has only via points; if a point is not finite it has no segments."""
     route, links, site_xpos, info = routes.rows[c], routes.links, poses.site_xpos, paths.info
     lo, hi, site, near = route[R_LO], route[R_HI], route[R_FROM], route[R_FROM_BODY]
     x, y, z = site_xpos[site, 0], site_xpos[site, 1], site_xpos[site, 2]
@@ -174,7 +174,7 @@ def _solve_straight(c, routes, poses, paths):
 
 @jit
 def solve_routes(routes, poses, paths, tol):
-    """Find path and speed of every route; `paths` keeps what failed routes had."""
+    """Find path and speed of every route; a route that fails keeps its segments and speed in `paths`."""
     node, seg, info, site_xpos = paths.node, paths.segments, paths.info, poses.site_xpos
     for c in range(routes.rows.shape[0]):
         route = routes.rows[c]
@@ -192,7 +192,7 @@ def solve_routes(routes, poses, paths, tol):
             paths.count[c] = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
         elif has_valid_length(status, info[c, lay.I_ERROR]):
             paths.count[c] = list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, lo + c)
-        else:  # where a string comes out again is anybody's guess
+        else:  # no path: where the string will touch again is not known
             _roll_back(lo, hi, cold or status == lay.ENDPOINT_INSIDE, node)
             continue
         info[c, lay.I_SPEED] = _curved_speed(c, routes, poses, paths)
@@ -202,8 +202,8 @@ def solve_routes(routes, poses, paths, tol):
 def measure_muscles(routes, info, states):
     """Turn solved routes into length [m], velocity [m/s] and status of every muscle.
 
-    A muscle with a route without a path keeps its last values; its status says why. Where something stands in for every
-    path that is missing (`end_inside.py`), the muscle has values, and the status a minus sign.
+    A muscle with a route without a path keeps its last values; its status says why. If all its missing paths have a
+    substitute (`end_inside.py`), the muscle has values, and its status a minus sign.
     """
     length, velocity, status = states.length, states.velocity, states.status
     c = 0

@@ -1,7 +1,8 @@
-"""Frames of a recording: what is drawn of all muscles at one evaluation in one call, and many such put in order.
+"""Frames of a recording: drawn data of all muscles at one evaluation, and their sorting by muscle over many frames.
 
-A frame is written while its evaluation is in the processor's cache. In a store, rows of a kind lie frame after frame;
-starts (T, K + 1) holds the row at which each part of a frame begins, and the row after the last one's end.
+A frame is written right after its evaluation, while the data are in the processor's cache. A store holds the rows of
+one kind of data, frame after frame; starts (T, K + 1) holds the first row of each of the K parts of a frame, and at
+last the row behind the frame.
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ from mjwrap.kernels.coupling.moments import length_jacobian
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
-F_AT, F_FORCE, F_TIP = 0, 3, 6  # columns of a force: a point [m], the force [N], 1 where the arrow ends there
+F_AT, F_FORCE, F_TIP = (
+    0,
+    3,
+    6,
+)  # columns of a force: a point [m], the force [N], 1 if the arrow ends at the point
 FORCE = 7
 
 
 @inlined
 def _force(out, count, x, y, z, fx, fy, fz, tip):
-    """Append a force where there is room; return the new count."""
+    """Append a force if there is room for it; return the new count."""
     if count < out.shape[0]:
         out[count, 0], out[count, 1], out[count, 2] = x, y, z
         out[count, 3], out[count, 4], out[count, 5] = fx, fy, fz
@@ -32,8 +37,8 @@ def _force(out, count, x, y, z, fx, fy, fz, tip):
 def _route_forces(c, routes, seg, seg_count, size, out, count):
     """Append the forces of route c on bodies, `size` times the unit vectors of its segments; return the new count.
 
-    It pulls at its origin and insertion. A surface or via point between them is pressed by the sum of the pulls at
-    both ends of the contact, midway between them.
+    At origin and insertion the string pulls. The force on a surface or via point between them is the sum of the forces
+    of both adjacent segments, placed midway between the contact points.
     """
     if seg_count[c] == 0:
         return count
@@ -78,11 +83,11 @@ def put_frame(
     subtree_com, xpos, xquat, muscles, columns, jacobian, t, points, strips, contacts, touches, forces, pulls, arms,
     positions, quaternions,
 ):  # fmt: skip
-    """Write frame t, which follows frame t - 1; return whether there was room for all of it.
+    """Write frame t, behind frame t - 1; return whether there was room for all of it.
 
-    points by route begin at strips (T, C + 1), contacts and forces by muscle at touches and pulls (T, n + 1). Rows for
-    which there is no room are counted and not written. arms (T, K): -dl/dq of the pairs (muscles, columns);
-    jacobian (n, nv): scratch.
+    strips (T, C + 1): first row of each route in points; touches, pulls (T, n + 1): first rows of each muscle in
+    contacts and forces. Rows for which there is no room are counted but not written. arms (T, K): moment arms -dl/dq of
+    the pairs (muscles, columns); jacobian (n, nv): scratch.
     """
     point, contact, force = 0, 0, 0
     if t > 0:
@@ -118,13 +123,13 @@ def put_frame(
     return point <= points.shape[0] and contact <= contacts.shape[0] and force <= forces.shape[0]
 
 
-# Frames are read as they lie, one after the other, and written to as many places as there are parts: where[k] is the
-# next row of part k. That is kinder to the processor's caches than the other way round.
+# Frames are read in order and written part by part: where[k] is the next row of part k. This uses the processor's
+# caches better than reading part by part.
 
 
 @jit
 def count_rows(starts, counts, where):
-    """Write how many rows parts have in frames to counts (K, T), and at which row each one begins in `out` to where."""
+    """Write how many rows each part has in each frame to counts (K, T), and its first row to where (K,)."""
     total = 0
     for k in range(counts.shape[0]):
         where[k] = total
@@ -135,7 +140,7 @@ def count_rows(starts, counts, where):
 
 @jit
 def gather(rows, starts, where, out, counts):
-    """Copy points from a store's rows (m, 3) to out, each part's one after the other over all frames; counts (K, T)."""
+    """Copy points from a store's rows (m, 3) to out, sorted by part, then by frame; counts (K, T) is written."""
     count_rows(starts, counts, where)
     for t in range(counts.shape[1]):
         for k in range(counts.shape[0]):
@@ -149,7 +154,7 @@ def gather(rows, starts, where, out, counts):
 
 @jit
 def gather_arrows(rows, starts, where, scale, tails, vectors, counts):
-    """Turn forces of a store into arrows `scale` [m/N] long, in the order of `gather`: tails and vectors (m, 3) [m]."""
+    """Write forces of a store as arrows, in the order of `gather`: tails and vectors (m, 3) [m]; scale [m/N]."""
     count_rows(starts, counts, where)
     for t in range(counts.shape[1]):
         for k in range(counts.shape[0]):
@@ -164,9 +169,9 @@ def gather_arrows(rows, starts, where, scale, tails, vectors, counts):
 
 @jit
 def list_strips(starts, routes, sizes, counts):
-    """Write the sizes of all strips with points, by muscle, then frame, then route, to sizes (C T,); return how many.
+    """Write the sizes of all strips with points to sizes (C T,), sorted by muscle, frame and route; return how many.
 
-    counts (n, T): how many strips a muscle has in a frame.
+    counts (n, T): number of strips of a muscle in a frame.
     """
     strips = 0
     c = 0

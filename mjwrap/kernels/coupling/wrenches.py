@@ -1,4 +1,4 @@
-"""Wrenches of muscles on bodies, and how they share xfrc_applied with what others put there."""
+"""Wrenches of muscles on bodies, added to xfrc_applied beside the forces that others write there."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
 
 @jit
-def _add_segment_force(pulled, force, row, mx, my, mz):
-    """Add a force along e, and its moment, to a body's row."""
-    pulled[0] += force * row[G_E]
-    pulled[1] += force * row[G_E + 1]
-    pulled[2] += force * row[G_E + 2]
-    pulled[3] += force * mx
-    pulled[4] += force * my
-    pulled[5] += force * mz
+def _add_segment_force(total, force, row, mx, my, mz):
+    """Add a force along e of a segment's row, and its moment, to a body's row (6); m: the moment r x e."""
+    total[0] += force * row[G_E]
+    total[1] += force * row[G_E + 1]
+    total[2] += force * row[G_E + 2]
+    total[3] += force * mx
+    total[4] += force * my
+    total[5] += force * mz
 
 
 @jit
 def body_wrenches(routes, poses, paths, tension, wrench):
-    """Write to wrench (nbody, 6) what all muscles do to every body, in the convention of `xfrc_applied`.
+    """Write the wrenches of all muscles on every body to wrench (nbody, 6), in the convention of `xfrc_applied`.
 
-    Moments are added up about the centre of mass of a body's tree, which both ends of a segment mostly share, and
-    moved to the body's own in the end.
+    Moments are summed about the centre of mass of a body's tree, which is mostly the same for both ends of a segment,
+    and at last moved to the body's own centre of mass.
     """
     for b in range(wrench.shape[0]):
         for i in range(6):
@@ -48,12 +48,12 @@ def body_wrenches(routes, poses, paths, tension, wrench):
                 mx, my, mz = moment(row, G_A, subtree_com[body_rootid[near]])
             _add_segment_force(wrench[near], force, row, mx, my, mz)
     for b in range(wrench.shape[0]):
-        pulled, centre, own = wrench[b], subtree_com[body_rootid[b]], poses.xipos[b]
-        fx, fy, fz = pulled[0], pulled[1], pulled[2]
+        total, centre, own = wrench[b], subtree_com[body_rootid[b]], poses.xipos[b]
+        fx, fy, fz = total[0], total[1], total[2]
         rx, ry, rz = centre[0] - own[0], centre[1] - own[1], centre[2] - own[2]
-        pulled[3] += ry * fz - rz * fy
-        pulled[4] += rz * fx - rx * fz
-        pulled[5] += rx * fy - ry * fx
+        total[3] += ry * fz - rz * fy
+        total[4] += rz * fx - rx * fz
+        total[5] += rx * fy - ry * fx
 
 
 # ------------------------------------------------------------------ xfrc_applied, shared with others
@@ -61,12 +61,14 @@ def body_wrenches(routes, poses, paths, tension, wrench):
 
 @jit
 def remove_from_xfrc(xfrc, others, mine, total, written):
-    """Leave in xfrc_applied (nbody, 6) what others put there.
+    """Remove mjwrap's last contribution from xfrc_applied (nbody, 6), so that only the forces of others remain.
 
-    Rows still as mjwrap wrote them get others' share back to the bit. Where a row was set to zero since then (a reset,
-    a viewer that clears all rows and assigns the one that its mouse pulls) there is nothing left to take back, nor
-    where others have assigned the same again. From rows that others have changed otherwise, mjwrap's last contribution
-    is subtracted.
+    A row that is as mjwrap left it gets the others' forces back, exactly. Nothing is removed from a row that was set to
+    zero since then (by a reset, or by a viewer that clears all rows and writes one), nor from one to which others have
+    assigned their own forces again. From a row that others have changed in another way, the contribution is subtracted.
+
+    others, mine, total (nbody, 6): the forces of others, mjwrap's, and their sum, as last written; written (nbody,):
+    the rows to which mjwrap has added.
     """
     cleared, untouched = False, False
     for b in range(xfrc.shape[0]):
@@ -96,7 +98,7 @@ def remove_from_xfrc(xfrc, others, mine, total, written):
 
 @jit
 def add_to_xfrc(xfrc, others, mine, total, written, wrench):
-    """Take the last contribution back and add the new wrench (nbody, 6) to xfrc_applied."""
+    """Remove the last contribution from xfrc_applied and add wrench (nbody, 6); arrays as of `remove_from_xfrc`."""
     remove_from_xfrc(xfrc, others, mine, total, written)
     for b in range(xfrc.shape[0]):
         loaded = False

@@ -1,6 +1,7 @@
-"""Where a straight segment is lowest over a surface, where that has a formula; and how it passes a torus' tube.
+"""The lowest point of a straight segment over a surface, in closed form; the way a segment passes a torus' tube.
 
-Everything in the frame S of the obstacle, between the points A and B. `dispatch.py` chooses, and samples the others.
+Everything in the frame S of the obstacle. The segment runs from A to B, with d = B - A; a point of it is given by its
+share of AB. `dispatch.segment_clearance` chooses the formula, and takes samples where there is none.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ def clamp(x):
 
 @jit
 def lowest_in_quadric(node, k, ax, ay, az, dx, dy, dz):
-    """Return where x^2/a^2 + y^2/b^2 + z^2/c^2 is smallest along the segment."""
+    """Return the share of AB at which x^2/a^2 + y^2/b^2 + z^2/c^2 is smallest."""
     ia, ib, ic = inverse_squares(node, k)
     square = ia * dx * dx + ib * dy * dy + ic * dz * dz
     if square == 0.0:
@@ -29,7 +30,7 @@ def lowest_in_quadric(node, k, ax, ay, az, dx, dy, dz):
 
 @jit
 def lowest_over_axis(half, ax, ay, az, dx, dy, dz):
-    """Return where the segment is nearest to the axis between -half and half (half = 0: to the centre)."""
+    """Return the share of AB that is nearest to the axis between -half and half (half = 0: to the centre)."""
     square = dx * dx + dy * dy + dz * dz
     if square == 0.0:
         return 0.0
@@ -44,16 +45,16 @@ def lowest_over_axis(half, ax, ay, az, dx, dy, dz):
 
 @jit
 def lowest_over_cone(slope, ax, ay, az, dx, dy, dz):
-    """Return where rho - slope z, a convex function along the segment, is smallest."""
+    """Return the share of AB at which rho - slope z, a convex function along the segment, is smallest."""
     flat = dx * dx + dy * dy
     if flat == 0.0:
         return 1.0 if slope * dz > 0.0 else 0.0
     near = -(ax * dx + ay * dy) / flat
     aside = (ax * dy - ay * dx) ** 2 / flat  # square of the line's distance from the axis
-    pull = slope * dz
-    if pull * pull >= flat:
-        return 1.0 if pull > 0.0 else 0.0
-    return clamp(near + pull * math.sqrt(aside / (flat * (flat - pull * pull))))
+    rise = slope * dz
+    if rise * rise >= flat:
+        return 1.0 if rise > 0.0 else 0.0
+    return clamp(near + rise * math.sqrt(aside / (flat * (flat - rise * rise))))
 
 
 @jit
@@ -76,7 +77,7 @@ def tube_angle(major, x, y, z):
 
 @jit
 def bounded_part(radius, ax, ay, az, dx, dy, dz):
-    """Return the shares of the segment between which it is inside a sphere about the origin; radius in [m]."""
+    """Return the shares of AB between which the segment is inside a sphere about the origin; radius in [m]."""
     square = dx * dx + dy * dy + dz * dz
     if not (radius < math.inf and square > 0.0):
         return 0.0, 1.0
@@ -88,7 +89,7 @@ def bounded_part(radius, ax, ay, az, dx, dy, dz):
 
 @jit
 def part_between(low, high, az, dz, first, last):
-    """Return the shares first..last of the segment without the parts that are not between two heights z."""
+    """Return the shares first..last of AB without the parts that are not between two heights z."""
     if dz == 0.0:
         return first, last
     one, two = (low - az) / dz, (high - az) / dz

@@ -110,18 +110,18 @@ def cone(k, node):
 def _curvature(node, k, column, around, along, across):
     """Write kappa, tau, beta where only the direction around the axis is curved; n is outward, b = t x n.
 
-    away from the apex e_m, around e_u: b.e_u has the size of t.e_m; its sign follows from the orientation of the frame.
+    around = t.e_u and along = t.e_m, with e_u around the axis and e_m away from the apex; b.e_u is along, with a sign.
     """
     away = 1.0 if node[k, DIM + 1] > 0.0 else -1.0
-    beside = away * along
+    b_around = away * along
     put_curvature(
-        node, k, column, across * around * around, across * around * beside, across * beside * beside
+        node, k, column, across * around * around, across * around * b_around, across * b_around * b_around
     )
 
 
 @jit
 def capsule(k, node):
-    """Helices on the cylinder and great circles on the caps in turn; the Jacobi fields run on through the seams."""
+    """Helices on the cylinder and great circles on the caps in turn; the Jacobi fields are continuous at the seams."""
     radius, half = node[k, DIM], node[k, DIM + 1]
     inverse = 1.0 / radius
     x, y, z = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]

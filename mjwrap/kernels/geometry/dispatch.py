@@ -1,9 +1,8 @@
-"""The table of surfaces: what each kind does for its geodesic, its points, its heights and its windings.
+"""Choice of the formulas by the kind of surface: geodesic, nearest points, heights, clearance and winding.
 
-A kind has a line in each function that needs the surface's own mathematics, which stands in a file of its own. The
-integrator is chosen here, outside its loop. Nothing falls through to another kind: one that is not listed gives NaN,
-and `solve_chain` ends with UNKNOWN_SURFACE before anything is solved. Beside this file only `wraps/single.py`, for
-wraps in closed form, compares kinds. Everything in the frame S of the obstacle.
+Each function has a line for each kind that has its own formula, which stands in the file of the surface. A kind that is
+not listed gives NaN; `solve_chain` returns UNKNOWN_SURFACE for it before anything is solved. Apart from this file only
+`wraps/single.py`, for wraps in closed form, compares kinds. Everything in the frame S of the obstacle.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 @jit
 def is_surface_kind(kind):
-    """Return whether a kind is that of a surface in the functions below."""
+    """Return whether a number is a kind of surface that the functions below know."""
     return lay.VIA < kind < lay.KINDS and kind == math.floor(kind)
 
 
@@ -71,8 +70,8 @@ def is_surface_kind(kind):
 def evaluate_geodesic(k, node):
     """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row.
 
-    Points come out in world directions relative to the surface's origin [m]. An unknown kind has NaN for points,
-    tangents and normals.
+    Points are in world directions relative to the surface's origin [m]. For an unknown kind, points, tangents and
+    normals are NaN.
     """
     kind = node[k, KIND]
     if kind == lay.CYLINDER:
@@ -98,7 +97,7 @@ def evaluate_geodesic(k, node):
 def project(node, k, x, y, z):
     """Return a point of obstacle k's surface near (x, y, z), and the outward normal there.
 
-    The nearest one but on ellipsoid and elliptic cylinder, where it lies on the ray from the centre or axis.
+    It is the nearest point, except on ellipsoid and elliptic cylinder, where it lies on the ray from centre or axis.
     """
     kind = node[k, KIND]
     if kind == lay.CYLINDER:
@@ -139,12 +138,12 @@ def height(node, k, x, y, z):
     return NAN
 
 
-# ----------------------------------------------------- what some kinds have better than the general way
+# --------------------------------------- functions with a general method, and better ones for some kinds
 
 
 @jit
 def nearest(node, k, x, y, z):
-    """Return the point of obstacle k's surface that is nearest to a point inside it; `project`, unless it is not."""
+    """Return the point of obstacle k's surface that is nearest to a point inside it."""
     kind = node[k, KIND]
     if kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
         return nearest_on_quadric(node, k, x, y, z)
@@ -154,7 +153,7 @@ def nearest(node, k, x, y, z):
 
 @jit
 def bounding_radius(node, k):
-    """Return the radius of a sphere about the origin of S that holds the surface [m]; infinite: not known, or none."""
+    """Return the radius of a sphere about the origin of S that contains the surface [m]; infinite if there is none."""
     kind = node[k, KIND]
     if kind == lay.SPHERE or kind == lay.CUSTOM:
         return node[k, DIM]
@@ -167,7 +166,7 @@ def bounding_radius(node, k):
 
 @jit
 def segment_clearance(node, k, ax, ay, az, bx, by, bz):
-    """Return the height of the lowest point of the segment from A to B over obstacle k, and its share of the way.
+    """Return the height over obstacle k of the lowest point of the segment from A to B [m], and its share of AB.
 
     In closed form for some convex kinds, else by samples of the height.
     """
@@ -186,7 +185,7 @@ def segment_clearance(node, k, ax, ay, az, bx, by, bz):
         share = lowest_over_cone(node[k, DIM + 1], ax, ay, az, dx, dy, dz)
     else:
         first, last = bounded_part(bounding_radius(node, k), ax, ay, az, dx, dy, dz)
-        if kind == lay.TORUS:  # nothing is low above or below a ring
+        if kind == lay.TORUS:  # the part within the height of the ring along z
             first, last = part_between(-node[k, DIM + 1], node[k, DIM + 1], az, dz, first, last)
         share = min(first, 1.0)
         if last > first:
@@ -202,7 +201,7 @@ def _height_at(node, k, share, ax, ay, az, dx, dy, dz):
 
 @jit
 def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
-    """Return the lowest point's share between two shares, from samples at the scale of the curvature, refined."""
+    """Return the share of AB of the lowest point between two shares: samples of the height, then golden sections."""
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     count = int(min(math.ceil((last - first) * size / (SAMPLE_SPACING * node[k, SIZE])), MAX_SAMPLES)) + 1
     step = (last - first) / count
@@ -210,7 +209,7 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
     before, here = lowest, lowest
     for i in range(1, count + 2):
         share = first + i * step
-        after = math.inf  # beyond the ends: a dip may lie next to one
+        after = math.inf  # beyond the last sample
         if i <= count:
             after = _height_at(node, k, share, ax, ay, az, dx, dy, dz)
         if after < lowest:
@@ -246,15 +245,15 @@ def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
     return best
 
 
-# ----------------------------------------------------------- winding, of the kinds with the trait BRANCHED
+# -------------------------------------------------- winding angle, for the kinds with the trait BRANCHED
 
 
 @jit
 def winding_angle(k, node):
-    """Return the angle that the path of the last evaluation sweeps, with sign [rad].
+    """Return the angle by which the path of the last evaluation winds about obstacle k, with sign [rad].
 
-    About the axis of a cylinder or cone (on an elliptic one in the affine image in which it is round), about the
-    middle of a torus' tube. NaN for other kinds.
+    About the axis of a cylinder or cone (for an elliptic cylinder in the affine image in which it is circular), about
+    the middle of a torus' tube. NaN for other kinds.
     """
     kind = node[k, KIND]
     if kind == lay.CYLINDER:
@@ -270,9 +269,9 @@ def winding_angle(k, node):
 
 @jit
 def segment_winding_angle(k, node, ax, ay, az, bx, by, bz):
-    """Return the angle that the straight segment from A to B sweeps about obstacle k [rad].
+    """Return the angle by which the straight segment from A to B winds about obstacle k [rad].
 
-    Asked of kinds whose side is topological and whose wraps are searched for; NaN for others.
+    For kinds whose side is topological and whose wraps are searched for; NaN for others.
     """
     if node[k, KIND] == lay.TORUS:
         return segment_winding_about_tube(node[k, DIM], ax, ay, az, bx, by, bz)

@@ -1,4 +1,4 @@
-"""A row's geodesic in the world, evaluated and displaced; the surface's own part is chosen by `dispatch.py`."""
+"""Evaluation of a row's geodesic in the world frame, and its displacement by natural geodesic variations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
 def geodesic(k, node, base_x, base_y, base_z):
     """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row.
 
-    Points come out in the world frame relative to (base_x, base_y, base_z) [m], directions in the world frame.
+    Points are in the world frame relative to (base_x, base_y, base_z) [m], directions in the world frame.
     """
     evaluate_geodesic(k, node)
     x, y, z = node[k, POS] - base_x, node[k, POS + 1] - base_y, node[k, POS + 2] - base_z

@@ -1,7 +1,7 @@
-"""Frames of rows, and per surface the nearest point with its normal and the signed height over it.
+"""Nearest point, normal and signed height of each surface; points and vectors turned into the frame of an obstacle.
 
-Everything but the first two functions in the frame S of the obstacle; `dispatch.py` chooses among them. The height is
-negative inside, positive outside, and to first order the distance where it is small.
+All functions but the first two work in the frame S of the obstacle; `dispatch.py` chooses among them. The height is
+negative inside and positive outside; near the surface it is the distance, to first order.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def project_sphere(radius, x, y, z):
 
 @jit
 def project_quadric(node, k, x, y, z):
-    """Return the point on the ray from the centre (or axis), which is near the nearest one for points near by."""
+    """Return the surface point on the ray from the centre or axis, near the nearest point, and the normal there."""
     ia, ib, ic = inverse_squares(node, k)
     if ia * x * x + ib * y * y + ic * z * z == 0.0:
         x = node[k, DIM]
@@ -84,7 +84,7 @@ def project_torus(major, minor, x, y, z):
 
 @jit
 def project_cone(radius, slope, x, y, z):
-    """Return the nearest point of the nappe, kept off the apex."""
+    """Return the nearest point of the cone, kept away from the apex, and the normal there."""
     rho = math.sqrt(x * x + y * y)
     cu, su = 1.0, 0.0
     if rho > 0.0:
@@ -124,7 +124,7 @@ def height_over_sphere(radius, x, y, z):
 
 @jit
 def height_over_quadric(node, k, x, y, z):
-    """Return the height over an ellipsoid or elliptic cylinder [m], minus its size in the centre."""
+    """Return the height over an ellipsoid or elliptic cylinder [m]; in the centre it is minus the size."""
     ia, ib, ic = inverse_squares(node, k)
     gx, gy, gz = ia * x, ib * y, ic * z
     square = gx * gx + gy * gy + gz * gz
@@ -143,7 +143,7 @@ def height_over_torus(major, minor, x, y, z):
 
 @jit
 def height_over_cone(radius, slope, x, y, z):
-    """Return the distance from a cone's nappe, as if it went on beyond the apex [m]."""
+    """Return the distance from a cone [m]; the same formula is used beyond the apex."""
     cone_radius = radius + slope * z
     rho = math.sqrt(x * x + y * y)
     return (rho - cone_radius) / math.sqrt(1.0 + slope * slope)

@@ -1,10 +1,8 @@
-"""Geodesics of the ellipsoid and of the elliptic cylinder x^2/a^2 + y^2/b^2 + z^2/c^2 = 1 (1/c = 0), in the embedding
-space.
+"""Geodesics of the ellipsoid and the elliptic cylinder (1/c = 0), x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, in Cartesian space.
 
 With g = (x/a^2, y/b^2, z/c^2), half the gradient, S = g.g and T = t.A t, A = diag(1/a^2, 1/b^2, 1/c^2), the geodesic
 obeys p'' = -(T/S) g, and Joachimsthal's integral C = T S is constant along it. So p'' = -(C/S^2) g and K = det A / S^2
-depend on the position alone: an equation for Stoermer's rule, which carries p and both Jacobi fields with one division
-a stage.
+depend on the position alone. Stoermer's rule integrates p and both Jacobi fields with one division per substep.
 """
 
 from __future__ import annotations
@@ -31,9 +29,9 @@ from mjwrap.kernels.geometry.stoermer import (
 from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, put_start
 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
-STEP = 0.8  # first step tried, in units of the local length scale
-NEAREST_STEPS = 60  # to the nearest point of an ellipsoid; five to ten are normal
-OFF_AXIS = 1e-9  # least share of a semi-axis by which a point is taken to be off the middle plane
+STEP = 0.8  # first step that is tried, in units of the local length scale
+NEAREST_STEPS = 60  # most Newton steps to the nearest point of an ellipsoid; five to ten are normal
+OFF_AXIS = 1e-9  # least distance from a middle plane with which a point enters, as a share of the semi-axis
 
 
 @jit
@@ -56,8 +54,8 @@ def onto(ia, ib, ic, x, y, z):
 def nearest_on_quadric(node, k, x, y, z):
     """Return the point of an ellipsoid or elliptic cylinder nearest to a point inside it; frame S.
 
-    Each coordinate of it is a^2 x / (a^2 + s), where s < 0 makes the sum of squares over a^2 one. That sum is convex
-    and falls with s, so Newton's method comes to the root from the left without a safeguard.
+    Each of its coordinates is a^2 x / (a^2 + s), with s < 0 such that the point is on the surface. The equation for s
+    is convex and falling, so that Newton's method converges to the root from the left without a safeguard.
     """
     a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
     ia, ib, ic = inverse_squares(node, k)
@@ -191,7 +189,7 @@ def quadric(k, node):
     for _ in range(MAX_STEPS):
         if left == 0.0:
             break
-        # the gradient's rate of change, and that of its rate: about 1/|s| of the complex zeros of S
+        # first and second rate of the gradient: about the reciprocal distance of the complex zeros of S
         pull = (ia * gx * gx + ib * gy * gy + ic * gz * gz) * c / (square * square)
         rate = math.sqrt((ux * ux + uy * uy + uz * uz + pull) / square)
         h = min(STEP / rate, longest)

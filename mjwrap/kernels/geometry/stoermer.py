@@ -1,11 +1,10 @@
-"""Stoermer's rule, extrapolated, for y'' = f(y): order 16 from eight columns of 1 to 8 substeps, side by side in SIMD
-lanes.
+"""Extrapolated Stoermer rule for y'' = f(y): order 16 from eight columns of 1 to 8 substeps, one in each SIMD lane.
 
-One large step of length H is done eight times over, with 1, 2, ..., 8 substeps; the errors have even powers of the
-substep only, so that fixed weights on the eight results cancel all but H^17 (Hairer, Norsett, Wanner, Solving
-Ordinary Differential Equations I, II.14). The columns are independent: they fill the lanes of the vector unit, which
-makes a step of order 16 as long as eight evaluations of f. The result without the last column is of order 14; the
-difference bounds the error. The surfaces write the rule out with their own f; lanes 0..3 are done after four rounds.
+A step of length H is computed eight times, with 1, 2, ..., 8 substeps. The errors contain only even powers of the
+substep, so that fixed weights on the eight results cancel all terms up to H^16 (Hairer, Norsett and Wanner 1993,
+Solving Ordinary Differential Equations I, II.14). The columns are independent and fill the lanes of the vector unit, so
+that a step takes the time of eight evaluations of f. Without the last column the result is of order 14; the difference
+estimates the error. Each surface writes out the rule with its own f; lanes 0..3 are complete after four rounds.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from mjwrap.kernels.compilation.jit import config, inlined
 from mjwrap.kernels.compilation.self_test import is_plain
 
 LANES = 8
-ROWS = 10  # of doubles that a step keeps for each lane
+ROWS = 10  # numbers that a step keeps for each lane
 _N = np.arange(1.0, LANES + 1.0)
 
 
@@ -32,28 +31,30 @@ def _weights(n: Any) -> Any:
     return np.array([np.prod([a * a / (a * a - b * b) for b in n if b != a]) for a in n])
 
 
-INVERSE = 1.0 / _N  # of the number of substeps
+INVERSE = 1.0 / _N  # reciprocal of the number of substeps
 INVERSE_SQUARE = 1.0 / (_N * _N)
 WEIGHT = _weights(_N)
-RATE_WEIGHT = WEIGHT * _N  # for the differences, which are 1/n of h times the rate
+RATE_WEIGHT = WEIGHT * _N  # weights of the last differences, which are h y' / n
 ERROR_WEIGHT = WEIGHT - np.append(_weights(_N[:-1]), 0.0)  # weights of the error estimate
 
-TOLERANCE = 1e-11  # of the estimate: the error of a step is then below 1e-12, mostly 1e-14 (docs/accuracy.md)
-SHRINK_EXPONENT = 1.0 / 15.0  # power by which a rejected step shrinks
-MAX_STEPS = 200  # of one geodesic, rejected ones included
+TOLERANCE = (
+    1e-11  # largest error estimate; the error of a step is then below 1e-12, mostly 1e-14 (docs/accuracy.md)
+)
+SHRINK_EXPONENT = 1.0 / 15.0  # power of TOLERANCE over the estimate by which a rejected step is shortened
+MAX_STEPS = 200  # most steps of one geodesic, with the rejected ones
 
 
 def _plain_stack() -> None:
-    """Return what stands for a pointer where nothing is compiled: `_plain_carray` makes the memory."""
+    """Return nothing, in place of a pointer, in kernels that are not compiled: `_plain_carray` makes the memory."""
 
 
 def _plain_carray(pointer: None, shape: tuple[int, ...]) -> Any:
-    """Return an array of its own, which lives as long as it is used (uncompiled kernels)."""
+    """Return a new array; for kernels that are not compiled."""
     return np.empty(shape)
 
 
 def _stack(typing_context: Any) -> Any:
-    """Return a pointer to ROWS x LANES doubles on the caller's stack: no allocation, and nothing can alias them."""
+    """Return a pointer to ROWS x LANES doubles on the caller's stack, without allocation and aliases."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = ir.ArrayType(ir.DoubleType(), ROWS * LANES)
@@ -63,7 +64,7 @@ def _stack(typing_context: Any) -> Any:
 
 
 def _carray() -> Any:
-    """Return what makes an array of a pointer; numba's own makes one whose references are counted."""
+    """Return the function that makes an array from a pointer, without counting references as numba's own does."""
     if config.DISABLE_JIT:
         return _plain_carray
     if is_plain():

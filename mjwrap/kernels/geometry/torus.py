@@ -1,9 +1,9 @@
-"""Geodesics of the torus with major radius R and minor radius r, in its meridian plane.
+"""Geodesics of the torus with major radius R and minor radius r, in the coordinates (rho, z) of the meridian plane.
 
 With rho the distance from the axis and c = rho^2 u' Clairaut's constant, q = c^2/rho^2 and the normal curvature
 kappa = (1 - q)/r + q cos v / rho, the geodesic obeys rho'' = q/rho - kappa cos v, z'' = -kappa sin v, and K = cos v /
-(r rho): forces that depend on the position alone, without angles, for Stoermer's rule. The angle u about the axis is c
-times the integral of 1/rho^2, by the trapezoidal rule on the same substeps, extrapolated alike.
+(r rho). These depend on the position alone, as Stoermer's rule requires. The angle u about the axis is c times the
+integral of 1/rho^2, by the trapezoidal rule on the same substeps with the same extrapolation.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mjwrap.kernels.geometry.stoermer import (
 from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, put_start
 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
-STEP = 0.8  # first step tried, in units of the local length scale
+STEP = 0.8  # first step that is tried, in units of the local length scale
 
 
 @jit
@@ -42,8 +42,8 @@ def _force(rho, z, major, ir, c2):
 
 @inlined
 def _substep(v, first, last, k, hh, p, z, a, r, major, ir, c2):
-    """Take substep k of the columns first..last: increments in rows 0..3 of v, their differences in 4..7, the sum in
-    8.
+    """Take substep k of the columns first..last: increments in rows 0..3 of v, their differences in rows 4..7, the
+    sum of 1/rho^2 in row 8.
     """
     for i in range(first, last):
         fp, fz, d, w = _force(p + v[0, i], z + v[1, i], major, ir, c2)
@@ -149,7 +149,7 @@ def torus(k, node):
         if (z >= 0.0) != (z1 >= 0.0) and rho + p1 < 2.0 * major:
             turns += 1.0 if (z >= 0.0) == (left > 0.0) else -1.0
         if h * dp < 0.0 < h * dp1:
-            # nearest to the axis in between: in the hole's circle, or where it turns back before (c)
+            # least distance from the axis within the step: the hole's radius, or c where the geodesic turns before it
             nearest = max(major - minor, abs(c))
             least_curvature = min(least_curvature, (1.0 - c2 * major / nearest**3) * ir)
         rho, z, dp, dz, a, da, r, dr = p1, z1, dp1, dz1, a1, da1, r1, dr1

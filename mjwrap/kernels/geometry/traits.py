@@ -1,6 +1,6 @@
-"""What is true of a row's surface: questions that the solver asks, answered by the row's column TRAITS.
+"""Properties of the surface of a row, read from the row's column TRAITS.
 
-The class of the surface says it (`mjwrap/surfaces/surface.py`); no kernel concludes it from the kind.
+They come from the class of the surface (`mjwrap/surfaces/surface.py`), never from the kind.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ TRAITS = lay.TRAITS
 
 @jit
 def closed_form(k, node):
-    """Return whether the wrap of row k's surface between two points is known in closed form."""
+    """Return whether the wrap of row k's surface between two points has a closed form."""
     return int(node[k, TRAITS]) & lay.CLOSED_FORM != 0
 
 
@@ -31,17 +31,17 @@ def hollow(k, node):
 
 @jit
 def one_sided(k, node):
-    """Return whether no two points have more than one stable wrap of the surface between them."""
+    """Return whether there is at most one stable wrap of the surface between any two points."""
     return int(node[k, TRAITS]) & lay.ONE_SIDED != 0
 
 
 @jit
 def random_starts(k, node):
-    """Return whether a cold start may throw strings over the surface, with hints drawn by chance."""
+    """Return whether a cold start may try hints at random places around the surface."""
     return int(node[k, TRAITS]) & lay.RANDOM_STARTS != 0
 
 
 @jit
 def ellipse_sections(k, node):
-    """Return whether the surface is the unit sphere stretched by DIM, and its plane sections are ellipses."""
+    """Return whether the surface is an ellipsoid with semi-axes DIM, so that its plane sections are ellipses."""
     return int(node[k, TRAITS]) & lay.ELLIPSE_SECTIONS != 0

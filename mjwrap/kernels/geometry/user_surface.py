@@ -1,16 +1,16 @@
-"""Surfaces that a user wrote: calls of machine code that was compiled apart from the kernels, by its address.
+"""Surfaces written by users: calls of functions that were compiled separately, by their addresses.
 
-A row of kind CUSTOM holds three addresses as float64 in DIM + 1 to DIM + 3 (they are below 2**53). Addresses are data:
-the kernels are the same for every surface and never compiled again for one. The C functions, all in the frame S [m]:
+A row of kind CUSTOM holds three addresses as float64 in DIM + 1 to DIM + 3 (they are below 2**53). So the kernels are
+the same for every such surface, and need not be compiled again. The C functions, all in the frame S [m]:
 
     void geodesic(const double start[7], double out[31])    start: P, t, s
     void project(double x, double y, double z, double out[6])    out: nearest point, outward unit normal
     double height(double x, double y, double z)    distance, to first order near the surface, negative inside
 
 `out` of the first one: P, Q, t_P, t_Q, n_P, n_Q; kappa, tau, beta at P; the same at Q; a, a', r, r'; the smallest
-kappa found along the geodesic; the smallest r over the arc so far; 1.0 where the geodesic leaves the surface's range of
-validity, else 0.0. An arc length may be negative. Where there is no surface the numbers are NaN. `mjwrap/custom` makes
-such functions.
+kappa on the geodesic; the smallest ratio of r to the arc length on the way; 1.0 where the geodesic leaves the surface's
+range of validity, else 0.0. An arc length may be negative. Where there is no surface the numbers are NaN.
+`mjwrap/surfaces/codegen/` makes such functions from a user's function.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _function(builder: Any, address: Any, returns: Any, arguments: list[Any]) ->
 
 
 def _buffer(builder: Any, size: int) -> Any:
-    """Return room for `size` doubles on the stack."""
+    """Return memory for `size` doubles on the stack."""
     return builder.bitcast(cgutils.alloca_once(builder, ir.ArrayType(_REAL, size)), _POINTER)
 
 
@@ -94,7 +94,7 @@ def _height_call(typing_context: Any, address: Any, x: Any, y: Any, z: Any) -> A
     return types.float64(*[types.float64] * 4), generate
 
 
-# --------------------------------------------------------------------- the same where nothing is compiled
+# ------------------------------------------------------------------ the same for kernels that are not compiled
 
 
 def _geodesic_plain(address: float, start: tuple[float, ...]) -> tuple[float, ...]:
@@ -123,7 +123,7 @@ _call_height: Any = _height_plain if config.DISABLE_JIT else intrinsic(_height_c
 
 @jit
 def custom_geodesic(k, node):
-    """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row; world directions, no base point.
+    """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row, as `dispatch.evaluate_geodesic`.
 
     Column W_OUT says whether it leaves the surface's range of validity (1) or not (0).
     """

@@ -1,4 +1,4 @@
-"""Small vector steps that every surface's geodesic takes with its row."""
+"""Vector operations on the columns of a row, used by the geodesics of all surfaces."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def put_curvature(node, k, column, kappa, tau, beta):
 
 @inlined
 def put_fields(node, k, a, da, r, dr, least_curvature, least_field):
-    """Write the Jacobi fields at Q and what the whole geodesic is judged by."""
+    """Write the Jacobi fields at Q to the row, and the columns W_KMIN and W_RMIN."""
     node[k, W_JAC] = a
     node[k, W_JAC + 1] = da
     node[k, W_JAC + 2] = r
@@ -67,6 +67,6 @@ def put_fields(node, k, a, da, r, dr, least_curvature, least_field):
 
 @jit
 def unit(x, y, z):
-    """Return the vector over its length."""
+    """Return the vector divided by its length."""
     inverse = 1.0 / math.sqrt(x * x + y * y + z * z)
     return x * inverse, y * inverse, z * inverse

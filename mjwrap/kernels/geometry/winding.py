@@ -1,7 +1,7 @@
-"""Winding: the angle that a string sweeps about an axis or a tube, followed from pose to pose.
+"""Winding angles: by how much a string winds about an axis or a tube, unwrapped from pose to pose.
 
-On which side a string passes a cylinder, a cone or a torus is a matter of topology. The swept angle holds it: a real
-number that changes continuously with the motion, known from the pose modulo 2 pi.
+The side on which a string passes a cylinder, a cone or a torus is topological. The winding angle holds it: a real
+number that changes continuously with the motion. The pose alone gives it modulo 2 pi.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ S_P, S_T, S_ARC = lay.S_P, lay.S_T, lay.S_ARC
 W_P, W_Q, W_E, W_L, W_LQ, W_EQ, W_ANGLE = lay.W_P, lay.W_Q, lay.W_E, lay.W_L, lay.W_LQ, lay.W_EQ, lay.W_ANGLE
 
 TWO_PI = 2.0 * math.pi
-SMALL_TURN = 0.5 * math.pi  # a change of the swept angle that can only be a continuous motion [rad]
+SMALL_TURN = 0.5 * math.pi  # largest change of the winding angle that counts as a continuous motion [rad]
 
 
 @jit
@@ -29,10 +29,10 @@ def nearest_turn(angle, reference):
 
 @jit
 def unwrap_angle(angle, before):
-    """Return the swept angle that equals `angle` modulo 2 pi and continues `before` [rad].
+    """Return the winding angle that equals `angle` modulo 2 pi and continues `before` [rad].
 
-    A string winds beyond one turn only in small steps: after a large jump nobody can tell, and the way within one turn
-    is taken.
+    Beyond one turn this holds for small changes only. After a large change the number of turns is not known, and the
+    angle within one turn is taken.
     """
     angle = nearest_turn(angle, before)
     if abs(angle) > TWO_PI and abs(angle - before) > SMALL_TURN:
@@ -42,16 +42,16 @@ def unwrap_angle(angle, before):
 
 @jit
 def tangents_sweep(root_a, root_b, radius):
-    """Return the angle that straight tangents of these lengths from A and B sweep about a circle [rad].
+    """Return the sum of the angles that straight tangents of these lengths from A and B cover about a circle [rad].
 
-    It is the sum of two arc tangents of root / radius, each less than a quarter turn.
+    Each of them is the arc tangent of root / radius, less than a quarter turn.
     """
     return math.atan2(radius * (root_a + root_b), radius * radius - root_a * root_b)
 
 
 @jit
 def winding_about_cylinder(k, node):
-    """Return the angle that the path of the last evaluation sweeps about a cylinder's axis, with sign [rad]."""
+    """Return the angle by which the path of the last evaluation winds about a cylinder's axis, with sign [rad]."""
     inverse = 1.0 / node[k, DIM]
     t_phi = (node[k, S_P] * node[k, S_T + 1] - node[k, S_P + 1] * node[k, S_T]) * inverse
     rate = t_phi * inverse
@@ -61,7 +61,7 @@ def winding_about_cylinder(k, node):
 
 @jit
 def _points_of_path(k, node):
-    """Return A, P, Q and B of the last evaluation in the frame S: where the path comes from, touches, and goes."""
+    """Return A, P, Q and B of the last evaluation in the frame S; A and B are the points before P and behind Q."""
     px, py, pz = node[k, S_P], node[k, S_P + 1], node[k, S_P + 2]
     size = -node[k, W_L]
     ex, ey, ez = turn_into_frame(
@@ -84,7 +84,7 @@ def _points_of_path(k, node):
 
 @jit
 def winding_about_tube(k, node):
-    """Return the angle that the path of the last evaluation sweeps about the middle of a torus' tube [rad]."""
+    """Return the angle by which the path of the last evaluation winds about the middle of a torus' tube [rad]."""
     ax, ay, az, px, py, pz, qx, qy, qz, bx, by, bz = _points_of_path(k, node)
     major = node[k, DIM]
     turns = tube_crossing(major, ax, ay, az, px, py, pz) + tube_crossing(major, qx, qy, qz, bx, by, bz)
@@ -97,16 +97,16 @@ def winding_about_tube(k, node):
 
 @jit
 def segment_winding_about_tube(major, ax, ay, az, bx, by, bz):
-    """Return the angle that the straight segment from A to B sweeps about the middle of a torus' tube [rad]."""
+    """Return the angle by which the straight segment from A to B winds about the middle of a torus' tube [rad]."""
     turns = tube_crossing(major, ax, ay, az, bx, by, bz)
     return tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az) + 2.0 * math.pi * turns
 
 
 @jit
 def winding_about_axis(k, node, ia, ib):
-    """Return the angle about z that the path of the last evaluation sweeps, x scaled by ia and y by ib [rad].
+    """Return the angle by which the path of the last evaluation winds about z, with x scaled by ia and y by ib [rad].
 
-    The geodesic's own share is W_ANGLE, in the same image.
+    W_ANGLE is the part of the geodesic, in the same scaled coordinates.
     """
     ax, ay, _, px, py, _, qx, qy, _, bx, by, _ = _points_of_path(k, node)
     ax, ay, px, py, qx, qy, bx, by = ia * ax, ib * ay, ia * px, ib * py, ia * qx, ib * qy, ia * bx, ib * by

@@ -1,6 +1,6 @@
-"""MuJoCo's activation at the end of a step, for actuators whose force already has it (`actearly`).
+"""MuJoCo's activation at the end of a step, which actuators with `actearly` use for their force.
 
-As in `mj_nextActivation` and the dynamics in `mj_fwdActuation` (engine_support.c, engine_forward.c), to rounding.
+As `mj_nextActivation` and the dynamics in `mj_fwdActuation` (engine_support.c, engine_forward.c), up to rounding.
 """
 
 from __future__ import annotations

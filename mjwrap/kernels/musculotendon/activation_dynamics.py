@@ -1,6 +1,7 @@
-"""First-order activation dynamics from excitation u to activation a, both held in [0, 1].
+"""First-order activation dynamics from excitation u to activation a, both clamped to [0, 1].
 
-A form is a code, a rate, a step under constant excitation, and a row in `rate` and `advance` below.
+Each form has a code, a function for the rate, one for a step under constant excitation, and a line in `rate` and
+`advance` below.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from mjwrap.kernels.compilation.jit import jit
 ZAJAC = 0
 SMOOTH = 1
 
-# Gauss-Legendre's nodes and weights on [0, 1], for the time that the smooth form takes.
+# Gauss-Legendre nodes and weights on [0, 1], for the time integral of the smooth form.
 NODES = tuple(float(0.5 + 0.5 * x) for x in np.polynomial.legendre.leggauss(8)[0])
 WEIGHTS = tuple(float(0.5 * w) for w in np.polynomial.legendre.leggauss(8)[1])
-PANEL = 0.5  # of ln |u - a|: the quadrature's error there is about 1e-13 of the time
-PANELS = 80  # in as many |u - a| falls to below 1e-17 of what it was
-MAX_STEPS = 20  # Newton steps in the last panel; two or three are normal
+PANEL = 0.5  # width of a panel in ln |u - a|; the relative error of the quadrature over it is about 1e-13
+PANELS = 80  # most panels; |u - a| has fallen below 1e-17 of its value then
+MAX_STEPS = 20  # most Newton steps in the last panel; two or three are normal
 
 
 @jit
@@ -70,7 +71,8 @@ def advance_activation(a, u, activation_time, deactivation_time, duration):
         return u + (a - u) * left * z / (z + 1.5 * (a - u) * (1.0 - left))
     y = 1.5 * (u - a) / z
     right = math.log(y) - y - duration / (activation_time * z)
-    s = right  # ln y; the residual is concave in it and negative here, so Newton climbs to the root and never passes it
+    # s = ln y; the residual is concave in s and negative at the start, so that Newton's method converges from below
+    s = right
     for _ in range(50):
         y = math.exp(s)
         step = (right - s + y) / (1.0 - y)
@@ -115,8 +117,9 @@ def _time_per_fall(w, u, rises, activation_time, deactivation_time, smoothing):
 def advance_smooth(a, u, activation_time, deactivation_time, smoothing, duration):
     """Return the activation after `duration` [s] under constant excitation u: `smooth_rate` solved to about 1e-13.
 
-    The distance w = |u - a| only falls, and time is an integral over s = -ln w whose integrand is smooth and bounded:
-    Gauss's quadrature over panels of s, and Newton's method for where in the last one the duration is used up.
+    The distance w = |u - a| falls monotonically, and the time is an integral over s = -ln w with a smooth, bounded
+    integrand: Gauss quadrature over panels of s, and Newton's method for the s in the last panel at which the duration
+    is reached.
     """
     u = min(max(u, 0.0), 1.0)
     a = min(max(a, 0.0), 1.0)

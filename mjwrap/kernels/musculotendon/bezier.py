@@ -1,13 +1,13 @@
 """Curves of quintic Bézier corners (Millard et al. 2013, doi 10.1115/1.4023390): y(x), its slope and its integral.
 
 A corner joins (x0, y0, slope) to (x1, y1, slope); its end tangents meet at C, and with c = 0.1 + 0.8 curviness the
-control points are P0, P0 + c (C − P0) twice, P1 + c (C − P1) twice, P1. Counted from P0 in units of P1 − P0, a
-coordinate is then 5 u (1 − u)³ (1 + u) q + 5 u³ (1 − u)(2 − u) r + u⁵ with q, r those of the inner points: two numbers
-a coordinate. Outside its corners a curve goes on along its end tangents.
+control points are P0, P0 + c (C − P0) twice, P1 + c (C − P1) twice, P1. Relative to P0, in units of P1 − P0, a
+coordinate is 5 u (1 − u)³ (1 + u) q + 5 u³ (1 − u)(2 − u) r + u⁵, with q and r the coordinates of the inner points.
+Outside its corners a curve continues along its end tangents.
 
-y(x) has no closed form, and inverting x(u) at every evaluation is slow. `tabulate` therefore inverts it once, to
-rounding, and fits a polynomial to the slope on each of some hundred pieces, halved until it is 1e-11 off, or 5e-15 of
-the corner's steepest slope; `evaluate` reads value and slope from its integral.
+y(x) has no closed form, and inverting x(u) at every evaluation is slow. So `tabulate` inverts it once, up to rounding,
+and fits a polynomial to the slope on each of some hundred pieces. Pieces are halved until the error is 1e-11 of the
+slope, or 5e-15 of the corner's steepest slope. `evaluate` takes value and slope from the integral of the polynomial.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels.compilation.jit import jit
 
-LAST_STEP = 1e-9  # last Newton step where the slope is far from zero
+LAST_STEP = 1e-9  # largest last Newton step, for slopes that are not near zero
 ROUNDING = 1e-16
-MAX_STEPS = 80  # Newton steps and bisections in an inversion; two steps are normal
-DEGREE = 9  # of a piece's value; its slope's is one less
-NARROWEST = 2.0**-10  # piece, in widths of its corner
-CELLS = 2048  # equal parts of a curve
-# Error of a piece's slope, relative to itself and to the steepest of its corner.
+MAX_STEPS = 80  # most Newton steps and bisections in an inversion; two are normal
+DEGREE = 9  # degree of the polynomial for a piece's value; that for its slope has one less
+NARROWEST = 2.0**-10  # half width of the narrowest piece, as a share of the width of its corner
+CELLS = 2048  # number of equal parts of a curve's range in which the piece is looked up
+# Error of a piece's slope, relative to the slope and to the steepest slope of its corner.
 RELATIVE_TOL, SLOPE_TOL = 1e-11, 5e-15
 
 Corner = tuple[float, float, float, float, float, float]  # x0, y0, slope at 0, x1, y1, slope at 1
@@ -46,7 +46,7 @@ def corners(ends: list[Corner], curviness: list[float]) -> Array:
 
 
 def coordinate(q, r, u):
-    """Return a coordinate of a corner at u in [0, 1], counted from one end in units of both ends, and its slope."""
+    """Return a coordinate of a corner at u in [0, 1], from 0 to 1, and its slope in u."""
     v = 1.0 - u
     uu, vv = u * u, v * v
     b, d = 5.0 * u * vv * v * (1.0 + u), 5.0 * vv * (1.0 - 2.0 * u - 5.0 * uu)
@@ -54,7 +54,7 @@ def coordinate(q, r, u):
     return q * b + r * e + uu * uu * u, q * d + r * f + 5.0 * uu * uu
 
 
-blend = jit(coordinate)  # of numbers; the plain form takes arrays, and compiles nothing at an import
+blend = jit(coordinate)  # for numbers; the plain function takes arrays and needs no compilation at import
 
 
 def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
@@ -76,7 +76,7 @@ def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
 
 
 def _straight(corner: Array, u: float) -> Array:
-    """Return the piece that goes on from an end of a corner along its tangent."""
+    """Return the straight piece that continues a corner along its end tangent."""
     piece = np.zeros(FIRST + DEGREE + 1)
     piece[MIDDLE], piece[SCALE] = corner[X0] + u * corner[DX], 1.0
     piece[FIRST] = corner[Y0] + u * corner[DY]
@@ -86,7 +86,7 @@ def _straight(corner: Array, u: float) -> Array:
 
 def _pieces(curve: Array) -> Array:
     """Return the pieces of all corners, from left to right, halved until each is close enough."""
-    nodes = np.cos(np.arange(DEGREE) * np.pi / (DEGREE - 1))  # with the ends, so that pieces meet there
+    nodes = np.cos(np.arange(DEGREE) * np.pi / (DEGREE - 1))  # with both ends, so that pieces are continuous
     tests = np.linspace(-1.0, 1.0, 11)
     spots = np.concatenate([[0.0], nodes, tests])
     fit = np.linalg.inv(np.vander(nodes, increasing=True)).T
@@ -142,7 +142,7 @@ def _curve(corner: Array, part: Array) -> tuple[Array, Array]:
 
 @jit
 def invert(q, r, wanted, start, enough):
-    """Return u in [0, 1] at which a rising coordinate has the wanted value: Newton's steps, kept in a bracket.
+    """Return u in [0, 1] at which a rising coordinate has the wanted value, by Newton steps in a bracket.
 
     The last step is at most `enough`; where the slope is not zero the error left is its square.
     """
@@ -166,7 +166,7 @@ def invert(q, r, wanted, start, enough):
 
 @jit
 def evaluate(pieces, cells, x):
-    """Return y and dy/dx at x of a curve that `tabulate` has cut into pieces."""
+    """Return y and dy/dx at x of a curve in the form that `tabulate` returns."""
     last = pieces.shape[0] - 1
     past = x - pieces[0, MIDDLE]
     cell = past * pieces[0, SCALE]
@@ -181,7 +181,7 @@ def evaluate(pieces, cells, x):
     if t > 1.0:
         k += 1
         t = (x - pieces[k, MIDDLE]) * pieces[k, SCALE]
-    # even and odd powers side by side: y = even + t odd in the square of t
+    # even and odd powers separately: y = even + t odd, both polynomials in t squared
     square = t * t
     even, odd = pieces[k, FIRST + DEGREE - 1], pieces[k, FIRST + DEGREE]
     d_even = d_odd = 0.0
@@ -196,7 +196,7 @@ def evaluate(pieces, cells, x):
 
 @jit
 def inverse(curve, y):
-    """Return x at which a curve that rises everywhere between its ends has the value y; its end's x beyond them."""
+    """Return x at which a curve that rises between its ends has the value y; outside its range x of the nearer end."""
     last = curve.shape[0] - 1
     if y <= curve[0, Y0]:
         return curve[0, X0]
@@ -227,7 +227,7 @@ def corner_integral(curve, i, u):
 
 @jit
 def integral(curve, x):
-    """Return the integral of a curve from the start of its first corner to x: exact but for rounding."""
+    """Return the integral of a curve from the start of its first corner to x, exact up to rounding."""
     past = x - curve[0, X0]
     if past <= 0.0:
         return past * (curve[0, Y0] + 0.5 * curve[0, S0] * past)

@@ -1,4 +1,4 @@
-"""De Groote-Fregly 2016 (doi 10.1007/s10439-016-1591-9): its curves, with the constants that OpenSim corrected.
+"""Curves of De Groote et al. 2016 (doi 10.1007/s10439-016-1591-9), with the constants that OpenSim corrected.
 
 Each curve returns its value and its slope. Fibre lengths in optimal lengths, fibre velocities in maximum contraction
 velocities (lengthening positive), tendon lengths in slack lengths, forces in maximum isometric forces.
@@ -11,16 +11,16 @@ import math
 from mjwrap.kernels.compilation.jit import jit
 
 CODE = 2
-LEAST = 0.2  # shortest fibre [l_o]: there the passive curve is zero, and negative below
+LEAST = 0.2  # shortest fibre [l_o]: there the passive curve is zero; below it would be negative
 
 PASSIVE_STIFFNESS = 4.0 / 0.6
 PASSIVE_OFFSET = math.exp(PASSIVE_STIFFNESS * (LEAST - 1.0))
 PASSIVE_SCALE = math.exp(4.0) - PASSIVE_OFFSET
 D1, D2, D3, D4 = -0.3211346127989808, -8.149, -0.374, 0.8825327733249912
 TENDON_STIFFNESS = math.log(6.0) / 0.049
-LARGEST_EXPONENT = 100.0  # exponent from which an exponential goes on straight, so that no force is infinite
-LARGEST_ASINH = 8.0  # |asinh| of the force-velocity curve's argument at 180 v_max: faster is not looked for
-MAX_STEPS = 60  # Newton steps; three or four are normal
+LARGEST_EXPONENT = 100.0  # an exponential is continued linearly above this exponent, so that it stays finite
+LARGEST_ASINH = 8.0  # bound of |asinh| in the force-velocity curve; reached at 180 v_max
+MAX_STEPS = 60  # most Newton steps for a velocity; three or four are normal
 
 
 @jit
@@ -76,8 +76,8 @@ def inverse_velocity(force):
 def balancing_velocity(strength, damping, wanted, close):
     """Return v with strength f_v(v) + damping v = wanted, and f_v and its slope there; one of the factors is above 0.
 
-    With s = D2 v + D3 = sinh y this is a y + b sinh y = c, convex on the root's side of zero: Newton's steps from
-    beyond the root fall to it. The last step is at most `close`; the error left is its square.
+    With s = D2 v + D3 = sinh y this is a y + b sinh y = c, convex on the root's side of zero, so that Newton's method
+    converges from beyond the root. The last step is at most `close`; the error left is its square.
     """
     a, b = -D1 * strength, -damping / D2
     c = strength * D4 + b * D3 - wanted
@@ -106,14 +106,14 @@ def balancing_velocity(strength, damping, wanted, close):
 
 @jit
 def tendon(x):
-    """Tendon force-length curve, one at 4.9 % strain. Negative below the slack length: whoever uses it clamps it."""
+    """Tendon force-length curve, one at 4.9 % strain; negative below the slack length, where callers use zero."""
     value, slope = _exponential(TENDON_STIFFNESS * (x - 1.0))
     return 0.2 * value - 0.2, 0.2 * TENDON_STIFFNESS * slope
 
 
 @jit
 def passive_energy(x):
-    """Integral of the passive curve from 0.2, where it is zero, to x: nowhere negative [F_max l_o]."""
+    """Integral of the passive curve from 0.2, where it is zero, to x; never negative [F_max l_o]."""
     past = PASSIVE_STIFFNESS * (x - LEAST)
     return PASSIVE_OFFSET * (math.expm1(past) - past) / (PASSIVE_STIFFNESS * PASSIVE_SCALE)
 

@@ -1,8 +1,8 @@
-"""The table of muscle laws: their codes, what is true of each, and whose curves are asked for.
+"""Choice of the curves by the muscle law: codes of the laws, their properties, and a function for each curve.
 
-A law has a file with its mathematics and a line in each function below that needs it; `mjwrap/muscles/laws.py` fills
-its columns of `params`. No other kernel compares codes. Nothing falls through to another law: a code that is not listed
-gives NaN, and a muscle with it ends with NON_FINITE.
+Each law has a file with its mathematics, and a line in each function below that needs it; `mjwrap/muscles/laws.py`
+fills its columns of `params`. No other kernel compares codes. A code that is not listed gives NaN, and the muscle gets
+the status NON_FINITE.
 
 Fibre lengths in l_o, fibre velocities in v_max l_o, tendon lengths in l_s, forces in F_max.
 """
@@ -18,30 +18,30 @@ PATH_ACTUATOR = path_actuator.CODE
 MUJOCO = mujoco_muscle.CODE
 DEGROOTE_FREGLY = degroote_fregly.CODE
 MILLARD = millard.CODE
-PARAMS = 21  # columns of the table of parameters
+PARAMS = 21  # number of columns of the table of parameters
 
 WITH_FIBER = (DEGROOTE_FREGLY, MILLARD)
 WITHOUT_FIBER = (PATH_ACTUATOR, MUJOCO)
-# whose tendon's curve is an exponential: the search for a balance takes its logarithm
+# laws whose tendon curve is an exponential: the search for a balance takes its logarithm
 EXPONENTIAL_TENDON = (DEGROOTE_FREGLY,)
 NAN = math.nan
 
 
 @jit
 def is_law_code(law):
-    """Return whether a code is that of a law."""
+    """Return whether a number is the code of a law."""
     return law in WITH_FIBER or law in WITHOUT_FIBER
 
 
 @jit
 def has_fiber(law):
-    """Return whether a law knows a fibre and its tendon, rigid or elastic."""
+    """Return whether a law has a fibre and a tendon, rigid or elastic."""
     return law in WITH_FIBER
 
 
 @jit
 def exponential_tendon(law):
-    """Return whether the logarithm of the tendon's force is nearly straight where that force is large."""
+    """Return whether the logarithm of the tendon force is nearly linear where the force is large."""
     return law in EXPONENTIAL_TENDON
 
 
@@ -122,7 +122,7 @@ def tendon_curve(law, x):
 
 @jit
 def passive_energy(law, x):
-    """Return the energy of the parallel elastic element [F_max l_o] at fibre length x [l_o], zero where it is free."""
+    """Return the energy of the parallel elastic element [F_max l_o] at fibre length x [l_o]; zero where it is slack."""
     if law == MILLARD:
         return millard.passive_energy(x)
     if law == DEGROOTE_FREGLY:

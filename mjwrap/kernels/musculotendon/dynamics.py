@@ -74,7 +74,7 @@ def read_states(muscles, inputs, timing, start):
 
 @jit
 def write_states(source, index, activation, fiber, act, own):
-    """Put the states that mjwrap integrates, (n,) each, back where `read_states` finds them."""
+    """Write the states that mjwrap integrates, (n,) each, to where `read_states` reads them."""
     for m in range(source.shape[0]):
         if source[m] == STATE_IN_ACT:
             act[index[m]] = activation[m]
@@ -94,11 +94,12 @@ def is_elastic(law, params, m):
 def drive_muscles(muscles, timing, start, states):
     """Write every muscle's tension, and its state at the end of the step, into `states`, which has length and speed.
 
-    The states in `start` are `since` [s] old (a stage of Runge-Kutta; fibre and path length are written here where it
-    is zero); the tension is to act for `ahead` [s] from here. Over both an elastic tendon takes one
-    implicit step, to the length that the path will have, so its tension is that at the end; with neither it is the
-    tendon's at this state. Elsewhere the tension is that of this state. A muscle without a path (status) keeps its
-    tension and fibre length; one with a minus sign goes on and loses it (`measure_muscles`).
+    The states in `start` are `since` [s] old (in a stage of Runge-Kutta; where it is zero, fibre and path length are
+    written to `start`). The tension will act for `ahead` [s]. An elastic tendon makes one implicit step over both
+    times, to the length that the path will have at the end, and its tension is that at the end; if both are zero, it is
+    that of the present state. With other laws the tension is that of the present state. A muscle without a path (status
+    > 0) keeps its tension and fibre length. One with a substitute path (status < 0, `measure_muscles`) is computed, and
+    its status becomes positive.
     """
     law, params, source, form, times, off = (
         muscles.law, muscles.params, muscles.source, muscles.form, muscles.times, muscles.off,
@@ -117,7 +118,7 @@ def drive_muscles(muscles, timing, start, states):
         if since <= 0.0:
             start.length[m] = length[m]
         states.activation[m], states.next_activation[m], next_fiber[m] = a, end, start.fiber[m]
-        if not math.isfinite(a + end):  # an unknown form of activation dynamics; a clamp would hide it
+        if not math.isfinite(a + end):  # an unknown form of activation dynamics; clamping would hide it
             states.activation[m] = states.next_activation[m] = start.activation[m]
             if status[m] <= lay.CONVERGED:
                 status[m] = lay.NON_FINITE
@@ -171,9 +172,9 @@ def simulate(
 ):
     """Run one muscle, row 0 of params, along prescribed lengths: arrays (T,) of time [s], length [m], velocity [m/s].
 
-    drive: excitations, or activations where `prescribed`, and then growth their rates [1/s]. activation[0] and fiber[0]
-    are the start (NO_FIBER: at equilibrium); activation, fiber and tension (T,) are filled, counts (T, 2) with
-    evaluations and status of each step.
+    drive: excitations; if `prescribed`, activations, with growth as their rates [1/s]. activation[0] and fiber[0] are
+    the start (NO_FIBER: equilibrium). activation, fiber and tension (T,) are filled, and counts (T, 2) with evaluations
+    and status of each step.
     """
     elastic = is_elastic(law, params, 0)
     if prescribed:

@@ -1,4 +1,4 @@
-"""Balance of fibre and tendon: the forces and their slopes, and the search for the root.
+"""Balance of fibre and tendon: forces and their slopes, and the fibre length or velocity at which they balance.
 
 Lengths in l_o, velocities in v_max l_o, forces in F_max; tendon lengths in l_s.
 """
@@ -16,18 +16,22 @@ from mjwrap.kernels.musculotendon.dispatch import (
     velocity_curve,
 )
 
+# statuses
 NORMAL = 0
-AT_MINIMUM = 1  # the fibre is at its minimum length, and does not balance the tendon
-SLACK_TENDON = 2  # no tension; the fibre's own force is zero too
+AT_MINIMUM = 1  # the fibre is at its minimum length and does not balance the tendon
+SLACK_TENDON = 2  # no tension; the fibre force is zero, too
 NOT_CONVERGED = 3
 
-MAX_EVALUATIONS = 150  # evaluations in one solution; a step of a simulation takes two or three
-NEAR_BALANCE = 1e-6  # [F_max] imbalance from which one more Newton step ends far below 1e-8
-LAST_STEP = 1e-6  # [l_s] largest such step of the tendon: the curvature of a tendon's curve is at most 2e3
-LONGEST_START = 1.08  # [l_s] tendon length from which at most the iteration starts
-# [F_max] imbalance above which an exponential tendon is taken by its logarithm, and what is added to the forces for it
-LOG_IMBALANCE, LOG_OFFSET = 0.2, 0.2
-MAX_VELOCITY = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
+MAX_EVALUATIONS = 150  # most evaluations of one solution; a step of a simulation takes two or three
+# [F_max] imbalance from which one more Newton step ends far below 1e-8 ...
+NEAR_BALANCE = 1e-6
+# ... if that step changes the tendon by at most this [l_s]; the curvature of a tendon curve is at most 2e3
+LAST_STEP = 1e-6
+LONGEST_START = 1.08  # [l_s] longest tendon with which an iteration starts
+# [F_max] imbalance above which the step of an exponential tendon is taken in logarithms of the forces ...
+LOG_IMBALANCE = 0.2
+LOG_OFFSET = 0.2  # [F_max] ... to which this is added
+MAX_VELOCITY = 100.0  # [v_max l_o] bound of the fibre velocity, where no force limits it
 
 
 # --------------------------------------------------------------------------- balance of tendon and fibre
@@ -35,7 +39,7 @@ MAX_VELOCITY = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resis
 
 @jit
 def balancing_velocity(law, strength, damping, wanted, close):
-    """Return v with strength f_v(v) + damping v = wanted, within a bound, and the force-velocity curve and its slope.
+    """Return v with strength f_v(v) + damping v = wanted, within a bound, and f_v and its slope there.
 
     close: largest last Newton step; the error left is its square.
     """
@@ -66,9 +70,10 @@ def forces(law, activation, damping, height, ratio, unit_length, x, v):
 
 @jit
 def balanced_forces(law, activation, damping, height, ratio, unit_length, x, least, close):
-    """Return the velocity that balances at x, and what `forces` does there; none shortens at the `least` length.
+    """Return the velocity that balances at fibre length x, and what `forces` returns there.
 
-    close as of `balancing_velocity`; with zero damping and activation the bound may stand for the velocity.
+    At the length `least` the velocity is not negative. close as of `balancing_velocity`; with zero damping and
+    activation the velocity may be the bound MAX_VELOCITY.
     """
     along = math.sqrt(x * x - height * height)
     pull, stiffness = tendon_curve(law, unit_length - ratio * along)
@@ -85,7 +90,7 @@ def balanced_forces(law, activation, damping, height, ratio, unit_length, x, lea
 
 @jit
 def _combine_curves(activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed):
-    """Return what `forces` does from the curves' values and slopes."""
+    """Return the results of `forces` from the values and slopes of the curves."""
     active, d_active, passive, d_passive = curves
     cosine = along / x
     strength = active * speed
@@ -101,26 +106,28 @@ def _combine_curves(activation, damping, height, ratio, x, v, along, pull, stiff
 
 @jit
 def rest_imbalance(law, activation, height, ratio, unit_length, x):
-    """Return the tendon's force less that of a fibre at rest [F_max] and the slope in x; arguments as of `forces`."""
+    """Return the tendon force minus that of a fibre at rest [F_max], and its slope in x; arguments as of `forces`."""
     pull, d_pull, force, d_force, _, _, _ = forces(law, activation, 0.0, height, ratio, unit_length, x, 0.0)
     return pull - force, d_pull - d_force
 
 
 @jit
 def balance(law, activation, damping, height, ratio, unit_length, before, rate, low, high, start, close):
-    """Return the fibre length [l_o] in [low, high] that balances, the tendon's force [F_max], evaluations and status.
+    """Return the fibre length [l_o] in [low, high] that balances, the tendon force [F_max], evaluations and status.
 
-    The fibre's velocity is (x - before) rate: for backward Euler, rate is one over (v_max x duration).
-    The tendon must pull no less than the fibre at `low`, else the fibre rests there, and no more at `high`. Newton's
-    steps from `start`, kept in a bracket that every evaluation narrows. A step taken within `close` [F_max] of balance
-    is the last, unless it crosses the tendon's slack length, where the slope jumps; with close zero the steps end at
-    rounding.
+    The fibre velocity is (x - before) rate: for backward Euler, rate is one over (v_max x duration). At `low` the
+    tendon has to pull at least as much as the fibre, else the result is `low`; at `high` at most as much. Newton steps
+    begin at `start` and are kept in a bracket that every evaluation narrows. The first step from an imbalance of at
+    most `close` [F_max] is the last one, unless it crosses the tendon's slack length, where the slope jumps. With close
+    = 0 the steps end at rounding errors.
     """
     least, x, pull = low, start, 0.0
     last_step = LAST_STEP if close <= NEAR_BALANCE else close
     low_known = high_known = False
     along = max(unit_length - 1.0, 0.0) / ratio
-    slack = math.sqrt(along * along + height * height)  # at this fibre length the tendon begins to pull
+    slack = math.sqrt(
+        along * along + height * height
+    )  # fibre length at which the tendon has its slack length
     along = max(unit_length - LONGEST_START, 0.0) / ratio
     shortest_start = min(max(math.sqrt(along * along + height * height), low), high)
     x = max(x, shortest_start)
@@ -134,7 +141,7 @@ def balance(law, activation, damping, height, ratio, unit_length, before, rate, 
             return least, pull, k, AT_MINIMUM
         step = -off / slope if slope < 0.0 else 0.0
         if off > LOG_IMBALANCE and exponential_tendon(law) and force >= 0.0:
-            # the tendon's exponential outweighs all else: the logarithms of both forces are nearly straight
+            # the exponential of the tendon dominates: the logarithms of both forces are nearly linear in x
             bend = d_pull / (pull + LOG_OFFSET) - d_force / (force + LOG_OFFSET)
             step = -math.log((pull + LOG_OFFSET) / (force + LOG_OFFSET)) / bend if bend < 0.0 else 0.0
         new = x + step
@@ -153,7 +160,7 @@ def balance(law, activation, damping, height, ratio, unit_length, before, rate, 
         if step == 0.0 or (new <= low and low_known) or (new >= high and high_known):
             new = 0.5 * (low + high)
         new = min(max(new, low if x <= shortest_start else max(low, shortest_start)), high)
-        if new == x:  # the bracket has no number inside
+        if new == x:  # there is no number left inside the bracket
             return x, pull, k, SLACK_TENDON if pull == 0.0 else NORMAL
         x = new
     return x, pull, MAX_EVALUATIONS, NOT_CONVERGED

@@ -1,4 +1,4 @@
-"""Named groups of the arrays that muscles' forces and states are computed from, a row or an entry for each muscle."""
+"""Named groups of arrays for forces and states of muscles, with a row or an entry for each muscle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from mjwrap.kernels.array_types import Flags, FloatRows, Floats, Ints, Number
 
 
 class Muscles(NamedTuple):
-    """What muscles are: laws, parameters, and where their activations come from; fixed while a model is."""
+    """Laws and parameters of muscles, and where their activations come from; constant for a model."""
 
     law: Ints  # code of the force law
     params: FloatRows  # (n, PARAMS), in the order of the law
@@ -17,13 +17,13 @@ class Muscles(NamedTuple):
     control: Ints  # index of the control in `ctrl`
     ctrl_low: Floats  # limits of the control
     ctrl_high: Floats
-    form: Ints  # of the activation dynamics
+    form: Ints  # code of the activation dynamics
     times: FloatRows  # (n, TIMES) constants of the activation dynamics
-    off: Flags  # which muscles pull with no tension and keep their states
+    off: Flags  # muscles that are switched off: no tension, constant states
 
 
 class Inputs(NamedTuple):
-    """What drives muscles, and the states that are kept between steps."""
+    """Controls and excitations, and the states that are kept between steps."""
 
     act: Floats  # mjData's
     ctrl: Floats  # mjData's
@@ -32,15 +32,15 @@ class Inputs(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """Where in a step an evaluation stands [s]."""
+    """Times of an evaluation within a step [s]."""
 
-    since: Number  # how old the states are: 0, or the time since a Runge-Kutta step began
-    ahead: Number  # how long the tensions are to act from here
+    since: Number  # age of the states: 0, or the time since a Runge-Kutta step began
+    ahead: Number  # time for which the tensions will act
     timestep: Number
 
 
 class StepStart(NamedTuple):
-    """Drives, and states at the start of the step."""
+    """Excitations, states and path lengths at the start of the step."""
 
     drive: Floats  # excitations
     activation: Floats
@@ -49,7 +49,7 @@ class StepStart(NamedTuple):
 
 
 class MuscleStates(NamedTuple):
-    """What an evaluation finds, one entry for each muscle."""
+    """Results of an evaluation, one entry for each muscle."""
 
     activation: Floats
     fiber: Floats  # fibre lengths [m]

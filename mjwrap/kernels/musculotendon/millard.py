@@ -1,4 +1,4 @@
-"""Millard et al. 2013 (doi 10.1115/1.4023390), damped equilibrium: its curves with OpenSim's default shapes.
+"""Curves of Millard et al. 2013 (doi 10.1115/1.4023390), damped equilibrium model, with OpenSim's default shapes.
 
 Each curve returns its value and its slope. Fibre lengths in optimal lengths, fibre velocities in maximum contraction
 velocities (lengthening positive), tendon lengths in slack lengths, forces in maximum isometric forces.
@@ -12,9 +12,9 @@ from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon import bezier
 
 CODE = 3
-LEAST = 0.4441  # shortest fibre that can pull [l_o]
-MAX_VELOCITY = 100.0  # [v_max l_o] bound of a fibre velocity that nothing resists
-MAX_STEPS = 80  # Newton steps and bisections for a velocity; three or four are normal
+LEAST = 0.4441  # shortest fibre with active force [l_o]
+MAX_VELOCITY = 100.0  # [v_max l_o] bound of the fibre velocity, where no force limits it
+MAX_STEPS = 80  # most Newton steps and bisections for a velocity; three or four are normal
 
 
 def _active():
@@ -72,7 +72,7 @@ _ACTIVE_PIECES, _ACTIVE_CELLS = bezier.tabulate(_ACTIVE)
 _VELOCITY = _velocity()
 _VELOCITY_PIECES, _VELOCITY_CELLS = bezier.tabulate(_VELOCITY)
 _SPEEDS, _FORCES = bezier.sampled(_VELOCITY, 1001)
-_VELOCITIES = np.interp(np.linspace(0.0, 1.4, 65), _FORCES, _SPEEDS)  # where iterations start
+_VELOCITIES = np.interp(np.linspace(0.0, 1.4, 65), _FORCES, _SPEEDS)  # start of iterations, by force
 _PASSIVE = _passive()
 _PASSIVE_PIECES, _PASSIVE_CELLS = bezier.tabulate(_PASSIVE)
 _TENDON = _tendon()
@@ -99,7 +99,7 @@ def velocity(v):
 
 @jit
 def inverse_velocity(force):
-    """Velocity at which `velocity` has the given value; -1 or 1 where there is none."""
+    """Velocity at which `velocity` has the given value; -1 or 1 outside the range of values."""
     return bezier.inverse(_VELOCITY, force)
 
 
@@ -107,8 +107,8 @@ def inverse_velocity(force):
 def balancing_velocity(strength, damping, wanted, close):
     """Return v with strength f_v(v) + damping v = wanted, and f_v and its slope there; one of the factors is above 0.
 
-    The start takes the curve as straight from rest to where it alone would balance; Newton's steps are kept in a
-    bracket. The last step is at most `close`; the error left is its square.
+    The start is the solution for a straight line through the curve's points at rest and at the velocity that balances
+    without damping. Newton steps are kept in a bracket. The last step is at most `close`; the error left is its square.
     """
     low, high = -MAX_VELOCITY, MAX_VELOCITY
     v = 0.0
@@ -144,7 +144,7 @@ def balancing_velocity(strength, damping, wanted, close):
 
 @jit
 def tendon(x):
-    """Tendon force-length curve: zero up to the slack length, one at 4.9 % strain, straight above two thirds."""
+    """Tendon force-length curve: zero up to the slack length, one at 4.9 % strain, linear above a force of two thirds."""
     return bezier.evaluate(_TENDON_PIECES, _TENDON_CELLS, x)
 
 

@@ -45,9 +45,9 @@ def _scale(params, m, column):
 
 @jit
 def tension(params, m, activation, length, speed):
-    """MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias` (engine_util_misc.c).
+    """Return the tension [N] of MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias`.
 
-    Where MuJoCo's would push (negative activation, or a force range above zero) there is no tension.
+    Where MuJoCo's actuator would push (negative activation, or a force range above zero) the tension is zero.
     """
     gear = params[m, 12]
     force, optimal = _scale(params, m, 0)

@@ -1,12 +1,13 @@
-"""Where the power of a musculotendon unit comes from and goes to, and the energy that its springs hold.
+"""Power of fibre, tendon and muscle, and the energy stored in the elastic elements.
 
-Power is positive where it is delivered: a fibre or tendon that shortens under tension delivers it. With the fibre's
-force F_M and velocity v_M, the tension F_T and the unit's lengthening speed v,
+Power is positive where it is delivered, as by a fibre or tendon that shortens under tension. With fibre force F_M,
+fibre velocity v_M, tension F_T and lengthening speed v of the musculotendon unit,
   fibre     -F_M v_M, the sum of its active, passive elastic and damping parts
   tendon    -F_T (v - v_M / cos α)
-  muscle    -F_T v, what reaches the skeleton = fibre + tendon + unbalanced
-  unbalanced (F_M - F_T / cos α) v_M: zero but where a law holds a fibre or tendon off its balance (see `powers`).
-The tendon's power is minus the rate of its energy, the passive elastic one minus that of the fibre's energy.
+  muscle    -F_T v, delivered to the skeleton = fibre + tendon + unbalanced
+  unbalanced (F_M - F_T / cos α) v_M: zero, except where fibre and tendon do not balance (see `powers`).
+The power of the tendon is minus the rate of its energy; that of the passive element minus the rate of the fibre's
+energy.
 """
 
 from __future__ import annotations
@@ -27,9 +28,8 @@ from mjwrap.kernels.musculotendon.fiber import DAMPING, ELASTIC, F_MAX, HEIGHT, 
 from mjwrap.kernels.musculotendon.umberger import metabolic_power
 
 # Rows of what `energetics` fills.
-FIBER_VELOCITY, ACTIVE, PASSIVE, DAMPED, FIBER, TENDON, MUSCLE, UNBALANCED, TENDON_ENERGY, FIBER_ENERGY = (
-    range(10)
-)
+FIBER_VELOCITY, ACTIVE, PASSIVE, DAMPED, FIBER, TENDON, MUSCLE, UNBALANCED = range(8)
+TENDON_ENERGY, FIBER_ENERGY = 8, 9
 ACTIVATION_HEAT, MAINTENANCE_HEAT, SHORTENING_HEAT, RESTING_HEAT, WORK, METABOLIC = range(10, 16)
 OUTPUTS = 16
 
@@ -38,9 +38,9 @@ OUTPUTS = 16
 def fiber_state(law, params, m, activation, length, speed, fiber_length):
     """Return fibre length [m] and velocity [m/s], cosine of the pennation angle, tendon length [m] and tension [N].
 
-    With an elastic tendon the velocity is that at which tendon and fibre balance, and a fibre below its shortest length
-    is taken to be there. With a rigid one it follows the unit; while that is shorter than its tendon, the fibre is
-    at rest at its height.
+    With an elastic tendon the velocity is that at which tendon and fibre balance; a fibre below its shortest length
+    counts as having that length. With a rigid one the fibre follows the unit; while the unit is shorter than its
+    tendon, the fibre is at rest and as long as its height.
     """
     slack, height = params[m, SLACK], params[m, HEIGHT]
     if params[m, ELASTIC] == 0.0:
@@ -61,8 +61,8 @@ def fiber_state(law, params, m, activation, length, speed, fiber_length):
 def powers(law, params, m, activation, length, speed, fiber_length, constants, excitation, out):
     """Fill column m of out (OUTPUTS, n) for a law with a fibre [W, J, m/s].
 
-    Unbalanced power is explicit: a rigid tendon beside a fibre that pushes has no tension; and without damping no fibre
-    velocity balances a tension beyond the range of the force-velocity curve.
+    Unbalanced power is listed separately. It occurs with a rigid tendon where the fibre pushes, as the tension is zero
+    then, and without damping where no fibre velocity balances a tension outside the range of the force-velocity curve.
     """
     f_max, optimal = params[m, F_MAX], params[m, OPTIMAL]
     now, velocity, cosine, tendon, tension = fiber_state(
@@ -99,9 +99,9 @@ def powers(law, params, m, activation, length, speed, fiber_length, constants, e
 
 @jit
 def energetics(law, params, activation, excitation, length, speed, fiber_length, constants, out):
-    """Fill out (OUTPUTS, n) for all muscles: arrays (n,), params (n, PARAMS), constants (n, CONSTANTS) of the heats.
+    """Fill out (OUTPUTS, n) for all muscles; arrays (n,), params (n, PARAMS), constants (n, CONSTANTS: `umberger.py`).
 
-    Laws without fibres (MuJoCo's muscle, the path actuator) have the power that reaches the skeleton only.
+    Laws without fibres (MuJoCo's muscle, the path actuator) have only the power delivered to the skeleton.
     """
     out[:] = 0.0
     for m in range(law.shape[0]):

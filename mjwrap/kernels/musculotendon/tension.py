@@ -1,4 +1,4 @@
-"""Tension of a musculotendon unit from activation, length and lengthening speed.
+"""Tension of a muscle from activation, length and lengthening speed, for all laws.
 
 `dispatch.py` lists the laws; `fiber.py` has pennation and tendon of those with a fibre. SI units; tension is never
 negative.
@@ -15,8 +15,8 @@ from mjwrap.kernels.musculotendon.fiber import rigid_tension
 def tension(law, params, m, activation, length, speed):
     """Return the tension of muscle m [N] under its law, activation 0..1, length [m] and lengthening speed [m/s].
 
-    Of a law with a fibre this is the tension with a rigid tendon; an elastic one has the fibre's length as a state.
-    NaN for a code that is no law's.
+    For a law with a fibre this is the tension with a rigid tendon; with an elastic one the fibre length is a state.
+    NaN for an unknown code.
     """
     if has_fiber(law):
         return rigid_tension(law, params, m, activation, length, speed)

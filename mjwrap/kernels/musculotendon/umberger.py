@@ -7,7 +7,7 @@ elsewhere, and v the fibre velocity in v_max:
   activation + maintenance heat  S A^0.6 (128 (1 - r) + 25) (0.4 + 0.6 f)
   shortening heat                S A^2 f (min(-250 v, 100) r - 153 v (1 - r))
   lengthening heat               S A f c 250 v, c = 4 (2003) or 0.3 (2010)
-  work                           -F v_M of the active fibre force, without its negative part in the model of 2010
+  work                           -F v_M of the active fibre force; its negative part counts as zero in the 2010 model
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ CONSTANTS = 8
 
 SLOW_HEAT = 25.0  # W/kg, activation and maintenance of slow-twitch fibres; 128 more for fast-twitch ones
 FAST_HEAT = 128.0
-ACTIVATION_SHARE = 0.4  # of this heat: does not depend on the overlap of filaments, as maintenance does
+ACTIVATION_SHARE = 0.4  # share of activation in this heat; it does not depend on the overlap of filaments
 SLOW_SHORTENING = (
     100.0 * 2.5
-)  # W/kg at 1 v_max: slow-twitch fibres are 2.5 times slower than fast-twitch ones ...
-SLOW_LIMIT = 100.0  # ... and reach their limit there [W/kg]
+)  # W/kg at 1 v_max; slow-twitch fibres are 2.5 times slower than fast-twitch ones
+SLOW_LIMIT = 100.0  # W/kg, limit of the slow-twitch shortening heat
 FAST_SHORTENING = 153.0
 LENGTHENING_2003 = 4.0  # times the slow-twitch coefficient of shortening
 LENGTHENING_2010 = 0.3
@@ -47,8 +47,8 @@ def metabolic_power(constants, m, activation, excitation, x, v, multiplier, acti
     """Return activation, maintenance, shortening, resting heat, mechanical work and their sum of muscle m [W].
 
     x: fibre length [l_o]; v: fibre velocity [v_max], lengthening positive; multiplier: active force-length curve at x;
-    active_power [W]: of the active fibre force, positive where it shortens. Resting heat lifts a muscle's heat to the
-    least rate. Shortening heat includes what keeps the sum from being negative.
+    active_power [W]: power of the active fibre force, positive in shortening. Resting heat is added up to the least
+    heat rate. With FORBID_NEGATIVE, shortening heat is increased so that the sum is not negative.
     """
     mass, aerobic, effort = constants[m, MASS], constants[m, AEROBIC], constants[m, EFFORT]
     if mass == 0.0:
@@ -71,7 +71,7 @@ def metabolic_power(constants, m, activation, excitation, x, v, multiplier, acti
         factor = LENGTHENING_2003 if constants[m, NEGATIVE_WORK] != 0.0 else LENGTHENING_2010
         shortening = mass * aerobic * drive * overlap * factor * SLOW_SHORTENING * v
 
-    # A force-velocity curve that is negative beyond v_max has the active force push there: no work is counted.
+    # beyond v_max a force-velocity curve may be negative, so that the active force pushes: this counts as no work
     work = effort * active_power if active_power * v <= 0.0 else 0.0
     if constants[m, NEGATIVE_WORK] == 0.0:
         work = max(work, 0.0)

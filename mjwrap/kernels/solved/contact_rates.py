@@ -1,7 +1,7 @@
 """Velocities of the contact points of a solved path, and rates of its arc lengths, as bodies move.
 
-A contact point is carried along by its body, slides along t by the rows e.n = 0 of the tangency conditions, and shifts
-along b ("Stiffness and sliding contacts" in docs/derivation.md; `hessian.py` finds the shifts).
+A contact point moves with its body, slides along t as the rows e.n = 0 of the tangency conditions demand, and shifts
+along b; `hessian.py` computes the shifts ("Stiffness and sliding contacts" in docs/derivation.md).
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from mjwrap.kernels.solved.path_points import (
     dot,
 )  # fmt: skip
 
-FLATTEST = 1e-12  # smallest normal curvature at a contact, in reciprocals of the surface's size
+FLATTEST = 1e-12  # smallest normal curvature at a contact, divided by the reciprocal of the surface's size
 
 
 @jit
 def contact_rates(count, twist, size, points, out):
     """Write velocity of P (3), of Q (3) and rate of s of every touched node to out (nodes, 7); return (fault, slot).
 
-    Velocities of the geometric points, what the bodies carry along and what slides; world frame [m/s]. size (nodes,):
-    of the surfaces [m], against which FLAT is judged.
+    The velocities are those of the geometric points, motion with the body plus sliding; world frame [m/s]. size
+    (nodes,): sizes of the surfaces [m], relative to which a curvature counts as zero (FLAT).
     """
     sideways_shifts(count, twist, points)
     for i in range(1, count):
@@ -69,7 +69,7 @@ def contact_rates(count, twist, size, points, out):
 
 @jit
 def _body_velocity(i, arm, twist, points, out, column):
-    """Write the velocity of the point at the end of `arm` that the body of point i carries along."""
+    """Write the velocity of the material point at `arm` from the pose's origin, on the body of point i."""
     k = int(points[i, D_SLOT])
     x, y, z = points[i, arm], points[i, arm + 1], points[i, arm + 2]
     row = int(points[i, D_ROW])
@@ -80,7 +80,7 @@ def _body_velocity(i, arm, twist, points, out, column):
 
 @jit
 def _contact_velocity(i, arm, j, slide, sideways, binormal, twist, points, out, column):
-    """Write the velocity of a contact point of point i: carried along, sliding along e of point j, shifting along b."""
+    """Write the velocity of a contact point of point i: body, slide along e of point j, and shift along b."""
     row = int(points[i, D_ROW])
     _body_velocity(i, arm, twist, points, out, column)
     for c in range(3):

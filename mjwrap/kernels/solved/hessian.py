@@ -1,23 +1,22 @@
 """Derivatives of a solved path as bodies move: sliding of the contact points, and the Hessian of the path's length.
 
-Implicit function theorem on the tangency conditions h = 0, whose Jacobian is in `tangency/path_error.py`. At a
-solution, where e = t, its 4 x 4 blocks come apart. Put x for the shift of P along b_P, y for that of Q along b_Q,
-relative to the surface; the rows e.b = 0 contain these alone, and are the stationarity of
+The implicit function theorem is applied to the tangency conditions h = 0, whose Jacobian is in
+`tangency/path_error.py`. At a solution, where e = t, its 4 x 4 blocks decouple. Let x be the shift of P along b_P and y
+that of Q along b_Q, relative to the surface. The rows e.b = 0 contain only these, and are the stationarity of
 
     sum over segments  |u + x b_P - y b_Q|^2 / L
     + sum over obstacles  (a x^2 - 2 x y + r' y^2) / r + 2 w.(x n_P - y n_Q)
 
-(only components across e count), u the difference of the material velocities at a segment's ends and w the angular
-velocity of an obstacle: a symmetric tridiagonal system. The rows e.n = 0 then give the slides along t one by one. As in
-`certify.is_local_minimum`, shifts are eliminated from the origin on by a Riccati recursion in the stiffness c behind
-each point, which divides neither by r, so that it holds at s = 0, nor by the normal curvature. Curvatures do not enter
-the Hessian at all: an obstacle's share comes from its frames at P and Q and its Jacobi fields. "Stiffness and sliding
-contacts" in docs/derivation.md.
+with only the components perpendicular to e, u the difference of the material velocities at a segment's ends, and w the
+angular velocity of an obstacle: a symmetric tridiagonal system. The rows e.n = 0 then give the slides along t, one by
+one. As in `certify.is_local_minimum`, the shifts are eliminated from the origin on by a Riccati recursion for the
+stiffness c behind each point. It divides neither by r, so that it holds at s = 0, nor by the normal curvature. The
+Hessian does not contain curvatures: an obstacle enters with its frames at P and Q and its Jacobi fields. See "Stiffness
+and sliding contacts" in docs/derivation.md.
 
 A chain over n obstacles and via points has n + 2 slots: origin, obstacles, insertion. Poses move by twists (n + 2, 6):
-velocity of the pose's origin, then angular velocity, world frame. `points` (rows of nodes + 2, POINT_ROW) holds the
-points that the path runs through, one row each from the origin to the insertion, nodes that are not touched left out
-(`path_points.py`).
+velocity of the pose's origin, then angular velocity, world frame. `points` (nodes + 2, POINT_ROW) has a row for each
+point on the path, from the origin to the insertion, without the nodes that are not touched (`path_points.py`).
 """
 
 from __future__ import annotations
@@ -62,11 +61,11 @@ from mjwrap.kernels.solved.path_points import (
 )  # fmt: skip
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
-# Faults of a path that has no derivatives, or of a quantity that it does not have.
+# Reasons why a path, or one of its quantities, has no derivative.
 NO_FAULT = 0
 VANISHING = 1  # a segment has no length: its direction has no derivative
-MARGINAL = 2  # a sideways shift changes the length by nothing: it has no rate
-FLAT = 3  # the surface is flat along the path: contact points slide at any speed
+MARGINAL = 2  # a sideways shift does not change the length: the rate of the shift is not determined
+FLAT = 3  # the surface is flat along the path: the sliding speed of the contact point is not determined
 
 MARGIN = 1e-9  # smallest stiffness against a sideways shift, as a share of the segment's own
 SHORTEST = 1e-150  # [m]
@@ -74,11 +73,11 @@ SHORTEST = 1e-150  # [m]
 
 @jit
 def _write_arriving_segment(k, node, x, y, z, px, py, pz, i, points):
-    """Enter the segment from (x, y, z) to (px, py, pz) that ends at point i, node k; return whether it has a length."""
+    """Write the segment from (x, y, z) to (px, py, pz), at point i and node k; return whether it has a length."""
     ex, ey, ez = px - x, py - y, pz - z
     size = math.sqrt(ex * ex + ey * ey + ez * ez)
     near = int(points[i - 1, D_ROW]) - int(points[i, D_ROW]) + k
-    # on a surface a vanishing segment has the direction of the geodesic that it meets
+    # a segment without length on a surface has the direction of the geodesic
     good = size > SHORTEST
     over = 1.0 / (size + SHORTEST)
     ex, ey, ez = ex * over, ey * over, ez * over
@@ -99,9 +98,9 @@ def _write_arriving_segment(k, node, x, y, z, px, py, pz, i, points):
 def list_path_points(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, points):
     """Write the points of the solved chain lo..hi and eliminate its shifts; return (how many, fault, slot at fault).
 
-    owner (hi - lo,): to which obstacle, counted from the first one, each node belongs, two where a surface may be
-    touched twice. Reads of a touched node only what its last evaluation left in the W_ columns. Where the fault is
-    VANISHING or MARGINAL the gradient is sound all the same, a vanishing segment having its geodesic's direction.
+    owner (hi - lo,): number of the obstacle to which each node belongs; a surface that may be touched twice has two
+    nodes. Of a touched node only the W_ columns of its last evaluation are read. With the faults VANISHING and MARGINAL
+    the gradient is valid nevertheless: a segment without length has the direction of its geodesic.
     """
     fault, where = NO_FAULT, 0
     x, y, z = 0.0, 0.0, 0.0
@@ -166,9 +165,9 @@ def list_path_points(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, points):
 
 @jit
 def _remove_part_along_segment(i, binormal, j, points):
-    """Take from a binormal of point i what the tangency error leaves along the direction that arrives at point j.
+    """Remove from a binormal of point i its component along the segment that arrives at point j.
 
-    With that the Hessian is symmetric to rounding, not to the tangency error.
+    The tangency error leaves a small one. Without it the Hessian is symmetric up to rounding errors.
     """
     along = dot(points, i, binormal, j, D_E)
     for c in range(3):
@@ -178,7 +177,7 @@ def _remove_part_along_segment(i, binormal, j, points):
 @jit
 def _carry_stiffness(k, node, i, points):
     """Carry the stiffness c from Q of the point before over the segment to P of point i, and on to its Q."""
-    # over the segment: c = 1/L - (b_Q·b_P)²/L² / (1/L + c), written so that nothing cancels; from a fixed point 1/L
+    # over the segment: c = 1/L - (b_Q·b_P)²/L² / (1/L + c), in a form without cancellation; from a fixed point 1/L
     over = 1.0 / (points[i, D_L] + SHORTEST)
     c = over
     if points[i - 1, D_TOUCHED] == TANGENT:
@@ -195,7 +194,7 @@ def _carry_stiffness(k, node, i, points):
 
 @jit
 def _velocity_difference(i, twist, points):
-    """Write the material velocity at P of point i less that at Q of the point before."""
+    """Write the material velocity at P of point i minus that at Q of the point before."""
     near, far = int(points[i - 1, D_SLOT]), int(points[i, D_SLOT])
     x, y, z = points[i, D_P], points[i, D_P + 1], points[i, D_P + 2]
     u = twist[far, 0] - twist[near, 0] + twist[far, 4] * z - twist[far, 5] * y
@@ -210,7 +209,7 @@ def _velocity_difference(i, twist, points):
 @jit
 def sideways_shifts(count, twist, points):
     """Find the shifts x, y of all contact points and the rate of every segment's direction as the poses move."""
-    # forward elimination: the slopes of the energy at P and Q, all before them free to follow
+    # forward elimination: slopes of the energy at P and Q, where all points before them are free to move
     for i in range(1, count):
         _velocity_difference(i, twist, points)
         if points[i, D_TOUCHED] == TANGENT:
@@ -265,7 +264,7 @@ def _add_force_and_moment(sign, i, arm, j, column, points, out):
 
 @jit
 def add_gradient(count, points, out):
-    """Add dl/dx (n + 2, 6) to out: what tension one asks of every pose, force and moment about its origin."""
+    """Add dl/dx (n + 2, 6) to out: the derivatives of the length in translation and rotation of every pose."""
     for i in range(1, count):
         _add_force_and_moment(1.0, i, D_P, i, D_E, points, out)
         _add_force_and_moment(-1.0, i - 1, D_Q, i, D_E, points, out)
@@ -273,7 +272,7 @@ def add_gradient(count, points, out):
 
 @jit
 def _add_rotation_part(sign, i, arm, j, twist, points, out):
-    """Add the symmetric part of d((w x arm) x e) of a rotating body, e the direction that arrives at point j."""
+    """Add the symmetric part of (w x arm) x e of a rotating body; e: unit vector of the segment that arrives at j."""
     k = int(points[i, D_SLOT])
     spin_e = sign * 0.5 * (
         twist[k, 3] * points[j, D_E] + twist[k, 4] * points[j, D_E + 1] + twist[k, 5] * points[j, D_E + 2]
@@ -288,8 +287,9 @@ def _add_rotation_part(sign, i, arm, j, twist, points, out):
 def add_stiffness_times(count, twist, points, out):
     """Add to out (n + 2, 6) the Hessian of the length times a motion of the poses.
 
-    The coordinates of a pose are the translation of its origin and the rotation vector from where it is, so the Hessian
-    is symmetric. The gradient's own rate, as add_gradient has it, differs by the moment m: rate = this - m x w / 2.
+    The coordinates of a pose are the translation of its origin and the rotation vector from its present orientation, so
+    that the Hessian is symmetric. The rate of the gradient that `add_gradient` computes differs in the moment m:
+    rate = this - m x w / 2.
     """
     sideways_shifts(count, twist, points)
     for i in range(1, count):

@@ -1,12 +1,13 @@
 """Sliding of the corner of a string that is held inside, as bodies move (`wraps/held_inside.py`, `hessian.py`).
 
-With e, e' the segments that meet at P, e - e' = -2 c n. Where P is displaced by x = x1 t1 + x2 t2 on a surface with
-curvatures k1, k2 the length's second variation is that of
+With e, e' the unit vectors of the segments that meet at P, e - e' = -2 c n. If P is displaced by x = x1 t1 + x2 t2 on a
+surface with curvatures k1, k2, the second variation of the length is that of
 
     |u + x|^2 / 2 L + |u' - x|^2 / 2 L' + c (k1 x1^2 + k2 x2^2) - 2 c w.(x x n)
 
-(only components across e and e' count), u, u' the differences of the material velocities over the two segments and w
-the surface's angular velocity. The corner stands between fixed points, so that x is all that is free: 2 x 2.
+with only the components perpendicular to e and e', u and u' the differences of the material velocities over the two
+segments, and w the surface's angular velocity. The points before and behind the corner are fixed, so that x is the only
+unknown: a 2 x 2 system.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ SHORTEST = 1e-150  # [m]
 
 @jit
 def list_corner(k, node, i, points):
-    """Write normal, directions of sliding and curvatures at the corner of node k, whose P stands in point i."""
+    """Write normal, sliding directions and curvatures of the corner of node k, whose P is in row i of `points`."""
     nx, ny, nz = normal(k, points[i, D_P], points[i, D_P + 1], points[i, D_P + 2], node)
-    # t1 round the axis: axis x n; on a sphere, whose curvatures are equal, any axis that is not along n
+    # t1 around the axis: axis x n; on a sphere, whose curvatures are equal, any axis that is not parallel to n
     cylinder = node[k, lay.INSIDE] == lay.ABOUT_AXIS
     x, y, z = node[k, lay.ROT + 2], node[k, lay.ROT + 5], node[k, lay.ROT + 8]
     if not cylinder:
@@ -66,7 +67,7 @@ def list_corner(k, node, i, points):
 
 @jit
 def stiffen_corner(i, points):
-    """Write the stiffness against sliding of the corner at point i; return its determinant over the segments'."""
+    """Write the stiffness against sliding of the corner at point i; return its determinant over (1/L + 1/L')^2."""
     # half the second variation, in x1 and x2: (1 - (e·t1)²)/L + (1 - (e'·t1)²)/L' + 2 c k1, and so on
     over, next_over = 1.0 / max(points[i, D_L], SHORTEST), 1.0 / max(points[i + 1, D_L], SHORTEST)
     c = 0.5 * (dot(points, i, D_NP, i + 1, D_E) - dot(points, i, D_NP, i, D_E))
@@ -83,11 +84,11 @@ def stiffen_corner(i, points):
 
 @jit
 def _driving_slope(i, direction, twist, points):
-    """Return what drives the corner at point i along one of its directions."""
+    """Return the right-hand side for sliding along one direction at the corner of point i."""
     near = dot(points, i, D_U, i, direction) - dot(points, i, D_U, i, D_E) * dot(points, i, direction, i, D_E)
     j = i + 1
     far = dot(points, j, D_U, i, direction) - dot(points, j, D_U, j, D_E) * dot(points, i, direction, j, D_E)
-    # w·(t x n): the surface's turning
+    # w·(t x n): rotation of the surface
     d, n, k = direction, D_NP, int(points[i, D_SLOT])
     turn = (
         twist[k, 3] * (points[i, d + 1] * points[i, n + 2] - points[i, d + 2] * points[i, n + 1])
@@ -99,7 +100,7 @@ def _driving_slope(i, direction, twist, points):
 
 @jit
 def slide_corner(i, twist, points):
-    """Write how the corner at point i slides as the poses move; D_U of both segments is known."""
+    """Write the slide of the corner at point i as the poses move; D_U of both segments must be known."""
     a, b = _driving_slope(i, D_T1, twist, points), _driving_slope(i, D_T2, twist, points)
     over = 1.0 / (points[i, D_H11] * points[i, D_H22] - points[i, D_H12] * points[i, D_H12])
     x, y = (
@@ -112,7 +113,7 @@ def slide_corner(i, twist, points):
 
 @jit
 def turn_corner(i, points, out):
-    """Add to out[slot of point i] the moment that its corner's slide makes: slide x (e - e')."""
+    """Add to out[slot of point i] the moment of the slide of its corner: slide x (e - e')."""
     k, j = int(points[i, D_SLOT]), i + 1
     x, y, z = points[i, D_SLIDE], points[i, D_SLIDE + 1], points[i, D_SLIDE + 2]
     ex, ey, ez = (

@@ -1,6 +1,6 @@
-"""The rows of `points` (rows of nodes + 2, POINT_ROW): the points that a path runs through, from origin to insertion.
+"""Columns of `points` (nodes + 2, POINT_ROW): a row for each point of a path, from the origin to the insertion.
 
-Nodes that are not touched have none. `hessian.py` says what a row is for.
+A node that is not touched has no row. `hessian.py` says what the columns are for.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ D_R = 24  # Jacobi field r at Q [m]
 D_KP = 25  # kappa, tau at P
 D_KQ = 27  # kappa, tau at Q
 D_COS = 29  # b_P . b_Q of the point before
-D_FIELD = 30  # a + c r: the Jacobi field that the path before P allows
+D_FIELD = 30  # a + c r: Jacobi field at Q of a unit shift of P, where the path before P is free to move
 D_PIVOT = 31  # 1 + c L of the segment that leaves
 D_C = 32  # stiffness c behind Q [1/m]
 D_U = 33  # difference of material velocities over the segment that arrives (3)
-D_GP = 36  # slope of the energy at P and at Q, the path before eliminated
+D_GP = 36  # slope of the energy at P and at Q, with the path before eliminated
 D_GQ = 37
 D_X = 38  # shift of P along b_P, of Q along b_Q
 D_Y = 39
 D_RATE = 40  # rate of e (3)
-D_ROW = 43  # of the node, from the chain's first one
+D_ROW = 43  # row of the node, counted from the chain's first one
 POINT_ROW = 44
 
 FIXED = 0.0  # origin, insertion, via point
 TANGENT = 1.0  # a contact that the path meets and leaves along the surface
 CORNER = 2.0  # a string held inside (`held_inside.py`), between two fixed points
-# A corner uses some of the columns differently.
-D_T1 = D_BP  # the directions in which it can slide (3 each): round and along a cylinder's axis
+# A corner uses some of the columns for other data.
+D_T1 = D_BP  # directions in which the corner can slide (3 each): around and along a cylinder's axis
 D_T2 = D_BQ
-D_BEND = D_KP  # curvature along them
-D_SLIDE = D_KQ  # how it slides (3); over D_KQ, D_COS
+D_BEND = D_KP  # curvatures along them (2)
+D_SLIDE = D_KQ  # slide of the corner (3); fills D_KQ and D_COS
 
 
 @jit

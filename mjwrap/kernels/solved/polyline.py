@@ -9,7 +9,7 @@ from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.geodesics import geodesic
 
 W_P, W_Q, W_TP, S_ARC, S_MODE = lay.W_P, lay.W_Q, lay.W_TP, lay.S_ARC, lay.S_MODE
-DRAWN_TURN = 0.1  # without a spacing, geodesics are drawn with this turn between points [rad]
+DRAWN_TURN = 0.1  # angle by which a geodesic turns between two points, where no spacing is given [rad]
 
 
 @jit
@@ -31,8 +31,8 @@ def _straight(x, y, z, px, py, pz, spacing, out, count):
 def polyline(lo, hi, ox, oy, oz, ix, iy, iz, node, spacing, out, first):
     """Write points along the solved chain lo..hi to out[first:], at most `spacing` apart; return how many.
 
-    With spacing <= 0 straight segments have their end points only and geodesics follow their turning. World frame
-    [m]. Where `out` is too short the points are counted and not written.
+    With spacing <= 0 straight segments have only their end points, and geodesics a point for each DRAWN_TURN. World
+    frame [m]. Points for which `out` is too short are counted but not written.
     """
     count = first
     if count < out.shape[0]:

@@ -1,8 +1,8 @@
 """Velocity and forces of a solved path, from its straight segments alone ("Velocity and force" in docs/derivation.md).
 
-Each end of a straight segment is a material point of some body at this instant. The list `seg` names them: one row per
-segment with near and far node (the chain's origin is lo - 1, its insertion hi), near point, far point and the unit
-vector e from near to far, in the world frame. A segment that vanishes on a surface has the geodesic's direction there.
+At any instant each end of a straight segment is a material point of some body. The list `seg` has a row for each
+segment: its near and far node (lo - 1 is the chain's origin, hi its insertion), near point, far point, and the unit
+vector e from near to far, in the world frame. Where a segment on a surface has no length, e is the geodesic's tangent.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ G_B = 5  # far point (3) [m]
 G_E = 8  # unit vector (3)
 SEGMENT = 11
 
-VANISHING = 1e-200  # a segment between two points has a direction above this length [m]
+VANISHING = 1e-200  # a segment that is not longer has no direction [m]
 
 
 @jit
@@ -41,7 +41,7 @@ def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
             px, py, pz = ix - ox, iy - oy, iz - oz
         ex, ey, ez = px - x, py - y, pz - z
         size = math.sqrt(ex * ex + ey * ey + ez * ez)
-        # without a length, on a surface: the direction of the geodesic
+        # a segment without length on a surface: the tangent of the geodesic
         if k < hi and node[k, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[k, lay.SIZE]:
             ex, ey, ez = node[k, lay.W_TP], node[k, lay.W_TP + 1], node[k, lay.W_TP + 2]
         elif near >= lo and node[near, lay.KIND] != lay.VIA and size <= ON_SURFACE * node[near, lay.SIZE]:
@@ -86,7 +86,7 @@ def lengthening_rate(count, seg, pos, twist):
     pos (n + 2, 3): positions of origin, obstacles and insertion; twist (n + 2, 6): linear velocity of that position,
     then angular velocity, world frame [m/s, rad/s].
     """
-    # (17): Σ e · (v of the far end - v of the near end); how the contact points slide drops out
+    # (17): Σ e · (v of the far end - v of the near end); the sliding of the contact points has no effect
     rate = 0.0
     for j in range(count):
         ex, ey, ez = seg[j, G_E], seg[j, G_E + 1], seg[j, G_E + 2]
@@ -109,7 +109,7 @@ def _add_point_force(wrench, row, px, py, pz, fx, fy, fz):
 
 @jit
 def add_wrenches(count, seg, tension, wrench):
-    """Add to wrench (n + 2, 6) what a path under tension [N] does to origin, obstacles and insertion.
+    """Add to wrench (n + 2, 6) the forces and moments of a path under tension [N] on origin, obstacles and insertion.
 
     Tension pulls the near end of a segment along +e and its far end along -e. World frame, moments about the world
     origin [N, N m].

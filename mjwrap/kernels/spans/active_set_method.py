@@ -1,14 +1,14 @@
-"""One span: the path between two fixed points over a row of obstacles, found and certified.
+"""Active-set method for one span: the path between two fixed points over a row of obstacles, found and certified.
 
-Which obstacles are touched is part of the answer ("Touching or not" in docs/derivation.md), so that this is an
-active-set method: init, rounds, terminate. A round has four phases:
+The obstacles that the path touches are unknown at first; they are the active set ("Touching or not" in
+docs/derivation.md). The method has the parts init, rounds and terminate. A round has four phases:
 
 1. Newton's method makes the path over the touched obstacles tangent (`_find_tangent_path`);
 2. the certificate says whether it is a local minimum of length (`certify.is_local_minimum`);
 3. lift-off and touchdown change which obstacles are touched (`_update_active_set`, `_split_or_merge_contacts`);
-4. where neither helps, a restart gives another start (`restarts.restart`).
+4. where neither helps, a restart gives another starting point (`restarts.restart`).
 
-It ends when a certified path needs no change, or when no restart is left.
+The method ends when a certified path needs no change, or when no restart is left.
 """
 
 from __future__ import annotations
@@ -42,15 +42,13 @@ COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 MAX_NEWTON = 25  # steps of Newton's method in a round
 MAX_ROUNDS = 50  # changes of the set of touched obstacles, restarts included
-COLD_PASSES = 3  # of obstacle-by-obstacle wrapping before Newton's method is tried
-EXTRA_CHANGES = (
-    4  # changes of the set of touched obstacles, beyond one for each, that count as going round in circles
-)
+COLD_PASSES = 3  # passes of wrapping obstacle by obstacle before Newton's method is tried
+EXTRA_CHANGES = 4  # changes of the active set, beyond one for each obstacle, after which it counts as cycling
 
 
 @no_inline
 def solve_active_set(lo, hi, ends, node, tol, direct):
-    """Find the path as `solve_span` says, from the saved solution alone, for ends that lie outside of every surface."""
+    """Find the path from the saved solution alone; as `solve_span`, but for ends outside of every surface only."""
     cold, known, evaluations = _init(lo, hi, ends, node, direct)
     iterations, restarts, changes = 0, 0, 0
     error = 0.0
@@ -69,7 +67,7 @@ def solve_active_set(lo, hi, ends, node, tol, direct):
             changed = _split_or_merge_contacts(lo, hi, ends, node, tangent)
         if changed > 0:
             changes += 1
-            # without this bound an obstacle could be touched and lifted off in turn for ever
+            # without this bound an obstacle could be touched and lifted off again without end
             if changes <= hi - lo + EXTRA_CHANGES:
                 continue
         saddle = tangent and changes == 0
@@ -86,16 +84,16 @@ def solve_active_set(lo, hi, ends, node, tol, direct):
     return status, path_length(lo, hi, ends, node), error, iterations, evaluations
 
 
-# The phases below have one caller; as calls of their own they would cost 4 % of a lone obstacle's warm solve.
+# The phases below have one caller; not inlined, they would cost 4 % of the warm solve of a lone obstacle.
 # --------------------------------------------------------------------------------------------- init
 
 
 @inlined
 def _init(lo, hi, ends, node, direct):
-    """Prepare the start; return (whether it is a cold one, what the rows hold of it, evaluations).
+    """Prepare the start; return (whether it is a cold start, `square` for `newton`, evaluations).
 
-    A warm start is left as it is, but with `direct` a lone obstacle is wrapped anew on its saved branch. W_OLD holds
-    the start to which restarts go back. What the rows hold of it is as for `newton`.
+    A warm start is left as it is, except that with `direct` a lone obstacle is wrapped anew on its saved branch. W_OLD
+    then holds the start, to which restarts return.
     """
     lone = hi - lo == 1
     evaluations = 0
@@ -111,7 +109,7 @@ def _init(lo, hi, ends, node, direct):
     if cold:
         save_solutions(lo, hi, node, W_OLD)
     known = GEODESICS_EVALUATED if cold or (direct and lone) else NOT_EVALUATED
-    # a wrap that was searched for ends with Newton's method, which has evaluated the path as well
+    # a wrap that was searched for ends with Newton's method, so that the path is evaluated already
     if cold and lone and node[lo, W_WRAP_ERROR] >= 0.0 and not closed_form(lo, node):
         known = node[lo, W_WRAP_ERROR]
     return cold, known, evaluations
@@ -119,9 +117,9 @@ def _init(lo, hi, ends, node, direct):
 
 @jit
 def _cold_start_passes(lo, hi, node):
-    """Return how often a cold start wraps obstacle after obstacle: once where a wrap is a search.
+    """Return how many times a cold start wraps all obstacles in turn: one pass less where a wrap is a search.
 
-    Newton's method on all of them takes as many steps from there as after a second pass, which costs more than one.
+    From there Newton's method takes as many steps as after one pass more, and the pass costs more than a step.
     """
     if hi - lo == 1:
         return 1
@@ -133,7 +131,7 @@ def _cold_start_passes(lo, hi, node):
 
 @jit
 def _all_hinted(lo, hi, node):
-    """Return whether hints choose the side of every obstacle."""
+    """Return whether the side of every obstacle is given, by a hint or because there is only one."""
     for k in range(lo, hi):
         if node[k, HINT] <= 0.0 and node[k, lay.TOUCH] == 0.0 and not one_sided(k, node):
             return False
@@ -147,10 +145,8 @@ def _all_hinted(lo, hi, node):
 def _find_tangent_path(lo, hi, ends, node, tol, known):
     """Run Newton's method; return (whether the path is tangent, ||f||, known, iterations, evaluations).
 
-    Tangent means ||f|| <= tol on the branch that the path was on.
-
-    known: what the rows hold of their start, as for `newton`; from the first run on, geodesics that contacts were
-    given.
+    Tangent means ||f|| <= tol, on the branch on which the path was before. known: `square` of `newton` for this run,
+    and for the next one: whatever changes contacts evaluates their geodesics.
     """
     if not any_in_mode(lo, hi, node, TOUCHED):
         return True, 0.0, known, 0, 0
@@ -161,10 +157,10 @@ def _find_tangent_path(lo, hi, ends, node, tol, known):
 
 @inlined
 def _update_active_set(lo, hi, ends, node):
-    """Change what a certified path touches; return how many contacts changed, and the status that forbids a path.
+    """Update the contacts of a certified path; return how many changed, and a status.
 
     Lift-off of obstacles whose arc is negative, merging of contacts that have met, and touchdown of obstacles that a
-    straight segment enters.
+    straight segment enters. The status is CONVERGED unless some obstacle makes a path impossible.
     """
     removed = lift_off(lo, hi, node) + merge_contacts(lo, hi, ends, node, MERGE_DISTANCE)
     added, status = touchdown(lo, hi, ends, node)
@@ -173,10 +169,10 @@ def _update_active_set(lo, hi, ends, node):
 
 @jit
 def _split_or_merge_contacts(lo, hi, ends, node, tangent):
-    """Split or merge contacts of a path that is no minimum; return how many.
+    """Split or merge contacts of a path that is not a minimum; return how many.
 
-    A tangent one may run through a hollow that a string bridges. Where Newton's method has failed, the segment over a
-    hollow may be about to vanish.
+    A tangent path may run through a hollow, which a string would bridge. Where Newton's method has failed, the segment
+    that bridges a hollow may be about to vanish.
     """
     if tangent:
         return split_at_hollow(lo, hi, ends, node)
@@ -188,16 +184,16 @@ def _split_or_merge_contacts(lo, hi, ends, node, tangent):
 
 @inlined
 def _terminate(lo, hi, ends, node, final, status):
-    """Return the status of the last iterate; `final`: it is certified and needs no change."""
+    """Return the status of the last iterate; final: it is certified and needs no change."""
     if not final:
         if _an_end_is_inside(lo, hi, ends, node):
             return lay.ENDPOINT_INSIDE
         if status == lay.NOT_MINIMAL:
             return status
-        # a surface that cannot be wrapped says more than that nothing was found
+        # a surface that cannot be wrapped is a more precise reason than NOT_CONVERGED
         _, status = touchdown(lo, hi, ends, node)
         return lay.NOT_CONVERGED if status == lay.CONVERGED else status
-    # an end inside is rare, and looking for it costs: only where the path shows a sign of it
+    # an end inside a surface is rare and costly to find: it is tested only where the path gives a sign of it
     suspect = status == lay.PENETRATING or (status == lay.CONVERGED and ends_in_short_segment(lo, hi, node))
     if suspect and _an_end_is_inside(lo, hi, ends, node):
         return lay.ENDPOINT_INSIDE
@@ -208,7 +204,7 @@ def _terminate(lo, hi, ends, node, final, status):
 
 @inlined
 def _store(lo, hi, node, final, restarts):
-    """Leave in the rows what the next solve needs; hints that a restart has ignored count again."""
+    """Write to the rows what the next solve needs; hints that a restart has ignored are valid again."""
     node[lo, lay.W_RESTARTS] = restarts
     for k in range(lo, hi):
         node[k, HINT] = abs(node[k, HINT])

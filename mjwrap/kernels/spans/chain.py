@@ -1,7 +1,7 @@
-"""Chains and motions: the spans between via points solved one after another, for one pose or for a whole sweep.
+"""Chains and motions: the spans between via points solved one after another, for one pose or for many.
 
-A chain runs from its origin over obstacles and via points to its insertion. A via point divides it: what is on one side
-does not depend on the other.
+A chain runs from its origin over obstacles and via points to its insertion. Via points divide it into spans, which do
+not depend on each other.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ I_ITERATIONS, I_EVALUATIONS = lay.I_ITERATIONS, lay.I_EVALUATIONS
 def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     """Find the path from (ox, oy, oz) to (ix, iy, iz) over nodes lo..hi; results go to info[row].
 
-    Points in the world frame [m]. The rows hold the last evaluation relative to the first point. Never raises and
-    never leaves NaN in `info`: where no path is found the status says why, and the length is that of the substitute
-    path where there is one (`end_inside.has_valid_length`), else of the last iterate, or of straight lines where even
-    that is not finite, NON_FINITE ones left out.
+    Points in the world frame [m]. The rows hold the last evaluation relative to the first point. Never raises and never
+    leaves NaN in `info`. Where no path is found the status says why. The length is then that of the substitute path
+    where there is one (`end_inside.has_valid_length`), else that of the last iterate. For a span whose last iterate is
+    not finite it is the straight distance; a span whose ends are not finite (NON_FINITE) is not counted.
     """
     total, square = 0.0, 0.0
     status, iterations, evaluations = lay.CONVERGED, 0, 0
     ax, ay, az = 0.0, 0.0, 0.0
     # the span start..k runs from A to B, both relative to the chain's origin
     start = lo
-    strange = False  # whether the span has a surface of a kind that no kernel knows
+    strange = False  # whether the span has a surface of an unknown kind
     for k in range(lo, hi + 1):
         if k < hi and node[k, KIND] != lay.VIA:
             strange = strange or not is_surface_kind(node[k, KIND])
@@ -70,7 +70,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
                 part, code = straight, lay.NOT_CONVERGED
             if not math.isfinite(error):
                 error = 1e300
-            # the first failure is reported, but for ENDPOINT_INSIDE, which may have a length all the same
+            # the first failure is reported; any other one replaces ENDPOINT_INSIDE, which may have a length
             if status == lay.CONVERGED or (status == lay.ENDPOINT_INSIDE and code != lay.CONVERGED):
                 status = code
             total += part
@@ -90,7 +90,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
 def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
     """Evaluate the path that the rows hold, without changing it; length and tangency error go to info[row].
 
-    The status is CONVERGED, or NOT_MINIMAL where a string would slip off; the tangency error is left to the caller.
+    The status is CONVERGED, or NOT_MINIMAL where a string would slip off; the caller checks the tangency error.
     """
     total, square = 0.0, 0.0
     status = lay.CONVERGED
@@ -134,9 +134,9 @@ def set_rotation(node, k, w, x, y, z):
 
 @jit
 def extrapolate(node, before):
-    """Start from the straight continuation of the last two poses where both touch; keep the last in `before`.
+    """Extrapolate the solutions of the last two poses linearly where both touch; copy the last one to `before`.
 
-    P, t and s go on by what they changed from the pose before to the last one, P and t back on the surface.
+    P, t and s change as they did from the last pose but one to the last; P and t are put back onto the surface.
     """
     for k in range(node.shape[0]):
         both = node[k, S_MODE] == lay.TOUCHED and before[k, 0] == lay.TOUCHED and node[k, lay.INSIDE] == 0.0
@@ -148,7 +148,7 @@ def extrapolate(node, before):
         if both:
             # a displacement by nothing projects P to the surface and t to its tangent plane
             displace(k, 0.0, 0.0, 0.0, 0.0, node)
-            # about to lift off: the extrapolated arc is no start
+            # about to lift off: a negative extrapolated arc is not a start
             if not node[k, S_ARC] > 0.0:
                 for i in range(lay.STATE):
                     node[k, S_MODE + i] = before[k, i]
@@ -156,7 +156,7 @@ def extrapolate(node, before):
 
 @jit
 def _was_restarted(node):
-    """Return whether a span of the last solve needed a restart, a start other than the one that it was given."""
+    """Return whether a span of the last solve needed another start than the one that it was given."""
     for k in range(node.shape[0]):
         if node[k, KIND] != lay.VIA and node[k, lay.W_RESTARTS] > 0.0:
             return True
@@ -165,7 +165,7 @@ def _was_restarted(node):
 
 @jit
 def _return_to_previous_pose(node, before):
-    """Go back to the solution of the pose before."""
+    """Restore the solution of the pose before."""
     for k in range(node.shape[0]):
         for i in range(lay.STATE):
             node[k, S_MODE + i] = before[k, i]
@@ -175,7 +175,7 @@ def _return_to_previous_pose(node, before):
 def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
     """Solve every pose of a motion: origin, insertion (T, 3), pos (T, n, 3), quat (T, n, 4); results in info (T, INFO).
 
-    Warm poses start from the straight continuation of the two poses before, cold ones from nothing.
+    warm: each pose starts from the linear extrapolation of the two poses before; else each pose is a cold start.
     """
     n = node.shape[0]
     before = np.empty((n, lay.STATE))
@@ -193,12 +193,12 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
         x, y, z = origin[j, 0], origin[j, 1], origin[j, 2]
         u, v, w = insertion[j, 0], insertion[j, 1], insertion[j, 2]
         solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
-        # the straight continuation may have led astray: solve once more from the pose before
+        # the extrapolation may have led to another path: solve once more from the pose before
         if warm and j > 0 and _was_restarted(node):
             _return_to_previous_pose(node, before)
             solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
         if warm and not has_valid_length(info[j, I_STATUS], info[j, I_ERROR]):
-            # go on from the last pose that was solved, or cold from where an end was inside
+            # the next pose starts from the last one that was solved, or cold if an end was inside a surface
             _return_to_previous_pose(node, before)
             for k in range(n):
                 if info[j, I_STATUS] == lay.ENDPOINT_INSIDE:

@@ -1,6 +1,6 @@
-"""Cold starts: obstacle after obstacle is wrapped by itself, between its neighbours' contact points.
+"""Cold starts: each obstacle is wrapped by itself, between its neighbours' contact points, one after the other.
 
-Every such wrap shortens the path, and Newton's method polishes the result.
+Every such wrap shortens the path; afterwards Newton's method makes it tangent.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ KIND, POS, ROT, HINT = lay.KIND, lay.POS, lay.ROT, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_P, W_Q, W_OLD = lay.W_P, lay.W_Q, lay.W_OLD
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
-SEARCH_EVERY = 6  # passes: a search costs as much as fifty wraps
+SEARCH_EVERY = 6  # lost contacts are searched for in every sixth pass: a search costs as much as fifty wraps
 
 
 @jit
 def next_contact_point(k, hi, ends, node, centred):
     """Return the contact point that comes next after node k, or the span's end B, relative to the base.
 
-    Before the first pass the hints of obstacles further on are taken for their contact points; with `centred` the
-    centre of the next one is.
+    For an obstacle that was not wrapped yet its hint stands for the contact point; with `centred`, where it has no
+    hint, its centre does.
     """
     for j in range(k + 1, hi):
         if centred and node[j, S_MODE] == COLD and node[j, HINT] <= 0.0:
@@ -53,9 +53,9 @@ def next_contact_point(k, hi, ends, node, centred):
 def wrap_in_turn(lo, hi, ends, node, passes, centred):
     """Wrap every obstacle in turn between its neighbours' contact points, `passes` times; return `passes`.
 
-    Lost contacts are searched for in some of the passes.
+    Lost contacts are searched for in every SEARCH_EVERY-th pass, beginning with the first.
     """
-    # a Gauss-Seidel sweep: each obstacle already sees the new contact point of the one before it
+    # a Gauss-Seidel sweep: each obstacle uses the new contact point of the one before it
     for i in range(passes):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
@@ -84,7 +84,7 @@ def path_length(lo, hi, ends, node):
 
 @jit
 def ends_of_part(lo, hi, first, last, ends, node):
-    """Return the ends, as of a span, of the part first..last of a path: the contact points on both sides of it."""
+    """Return `ends` for the part first..last of a span: the contact points before and behind it."""
     ax, ay, az = ends[3], ends[4], ends[5]
     for j in range(first - 1, lo - 1, -1):
         if node[j, S_MODE] == TOUCHED:

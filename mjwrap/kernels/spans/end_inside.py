@@ -1,22 +1,22 @@
 """The substitute path of a span with an end inside a surface, where no string can lie, and its gradient.
 
-So that length and force follow the bodies all the same, the end A is taken to F, the surface's nearest point, and what
-lies between them is not counted: the length is that of the path from F. Length and gradient are continuous as A goes
-through the surface: a string that wraps leaves along the tangent t, and to first order F moves as A does, but for the
-normal, which makes no difference.
+Length and force have to follow the bodies nevertheless. So the end A is replaced by F, the nearest point of the
+surface; the distance between A and F is not counted, and the length is that of the path from F. Length and gradient are
+continuous as A passes through the surface: a string that wraps leaves F along the tangent t, and to first order F moves
+as A does, except along the normal, which is perpendicular to t.
 
-A string that leaves F at once has a component along the normal. The straight way through, which ignores that surface,
-is longer then than the way from F, and goes on from the path outside without a kink. So the longest of these ways is
-taken. The gradient has a kink, of the order of the depth, where one way takes over.
+A string that leaves F without touching the surface has a component along the normal. Then the straight path from A that
+ignores this surface is longer than the path from F, and continues the path outside without a kink. So the longest of
+these paths is taken. The gradient has a kink, of the order of the depth, where another path becomes the longest.
 
-With W the shape operator at F and h < 0 the height of A, A = F + h n moves by (I + h W) dF along the surface, so the
-gradient with respect to A is -(I + h W)^-1 t. As a pull e it acts between A's body and the surface's at A itself. It
-grows without bounds towards where F is no longer the only nearest point, an axis or a centre, so the way from F is
-taken no deeper than half the way there.
+Let W be the shape operator at F and h < 0 the height of A. Along the surface, A = F + h n moves by (I + h W) dF, so
+that the gradient with respect to A is -(I + h W)^-1 t. As a force e it acts between A's body and the surface's body, at
+A. It grows without bound where the nearest point is not unique, at an axis or a centre; so the path from F is used down
+to half of that depth only.
 
-There is no substitute on a surface whose wraps have to be searched for: an ellipsoid, a capsule, a torus, a user's own.
-There the wrap from one F was on another side than that from the next, in some of 10,000 small steps, and with both ends
-inside one capsule in many. See "An end inside a surface" in docs/derivation.md.
+There is no substitute on a surface whose wraps have to be searched for: ellipsoid, capsule, torus, user's surface. In
+tests the wraps from two neighbouring F were on different sides in some of 10,000 small steps, and in many with both
+ends inside one capsule. See "An end inside a surface" in docs/derivation.md.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ from mjwrap.kernels.wraps.single import contains
 
 KIND, POS, ROT, S_MODE = lay.KIND, lay.POS, lay.ROT, lay.S_MODE
 NO_SUBSTITUTE = 1e300  # the tangency error where there is no substitute path
-LEAST_EIGENVALUE = 0.5  # of I + h W: how deep an end may be below a surface on which the string wraps
+LEAST_EIGENVALUE = (
+    0.5  # smallest eigenvalue of I + h W: bounds the depth of an end whose string wraps the surface
+)
 
 
 @jit
@@ -75,9 +77,9 @@ def _first_and_last_contact(lo, hi, node):
 
 @jit
 def _is_too_deep(k, point, normal, curvature, ends, column, node):
-    """Return whether an end is too far below the contact of row k on which the path begins, or ends.
+    """Return whether an end is too deep below the contact of row k at which the path begins or ends.
 
-    The smallest eigenvalue of I + h W counts: at zero the gradient has no bound.
+    The smallest eigenvalue of I + h W decides: where it is zero the gradient is infinite.
     """
     h = 0.0
     for i in range(3):
@@ -89,7 +91,7 @@ def _is_too_deep(k, point, normal, curvature, ends, column, node):
 
 @jit
 def _lift_all(lo, hi, node):
-    """Take the string off rows lo..hi; the sides that they keep stay."""
+    """Remove the contacts of rows lo..hi; their saved sides stay."""
     for k in range(lo, hi):
         node[k, S_MODE] = lay.FREE
         for i in range(lay.S_P - S_MODE, lay.STATE):
@@ -100,9 +102,8 @@ def _lift_all(lo, hi, node):
 def substitute_path(lo, hi, ends, node, tol, direct):
     """Find the substitute path of a span with an end inside; return (length, error, iterations, evaluations).
 
-    ends, tol and direct as in `span_solver.solve_span`. The error is NO_SUBSTITUTE where there is none. The saved
-    solution is that of the substitute path, but for the surfaces that it ignores, which keep the sides of the way from
-    F.
+    ends, tol and direct as in `span_solver.solve_span`. The error is NO_SUBSTITUTE where there is no substitute path.
+    The saved solution is that of the substitute path; surfaces that it ignores keep the sides of the path from F.
     """
     # a, b: obstacles inside which A and B lie; p, q: their nearest surface points, or A and B themselves
     a, b = _containing_obstacle(lo, hi, ends, 3, node), _containing_obstacle(lo, hi, ends, 6, node)
@@ -112,7 +113,7 @@ def substitute_path(lo, hi, ends, node, tol, direct):
         px, py, pz = _nearest_surface_point(a, ends, 3, node)
     if b >= 0:
         qx, qy, qz = _nearest_surface_point(b, ends, 6, node)
-    # the path between the nearest points; it leaves F at once where the surface of that end is not touched first
+    # the path between the nearest points; leaves_a, leaves_b: it does not touch the surface at F
     moved = (gx, gy, gz, px, py, pz, qx, qy, qz)
     status, best, error, iterations, evaluations = solve_active_set(lo, hi, moved, node, tol, direct)
     behind = surface_end(a, hi, node) if a >= 0 else lo
@@ -122,13 +123,13 @@ def substitute_path(lo, hi, ends, node, tol, direct):
     good = (a < 0 or closed_form(a, node)) and (b < 0 or closed_form(b, node))
     good = good and (not leaves_a or a == lo)  # only the surface next to an end can be ignored
     good = good and (not leaves_b or surface_end(b, hi, node) == hi)
-    # one that leaves F and meets the same surface again, behind a hollow, is none of the ways that are known
+    # a path that leaves F and touches the same surface again, behind a hollow, is not covered
     good = good and (a < 0 or leaves_a or node[k, lay.W_L] <= ON_SURFACE * node[k, lay.SIZE])
     good = good and (b < 0 or leaves_b or node[j, lay.W_LQ] <= ON_SURFACE * node[j, lay.SIZE])
     if status != lay.CONVERGED or not good:
         return best, NO_SUBSTITUTE, iterations, evaluations
     save_solutions(lo, hi, node, lay.W_START)
-    # the straight ways through the surface of A, of B, and of both; over: that surface is ignored
+    # the paths that ignore the surface of A, of B, and of both; over_a, over_b: it is ignored
     for choice in range(1, 4):
         over_a, over_b = choice % 2 == 1, choice >= 2
         if (over_a and a != lo) or (over_b and (b < 0 or surface_end(b, hi, node) != hi)):
@@ -148,7 +149,7 @@ def substitute_path(lo, hi, ends, node, tol, direct):
             status, length, off, i, e = solve_active_set(first, last, part, node, tol, direct)
             iterations += i
             evaluations += e
-        # where the string leaves F at once, the path outside goes on as the way through, which has to be known
+        # where the string leaves F without touching, the path that ignores the surface is needed
         if status != lay.CONVERGED and ((over_a and leaves_a) or (over_b and leaves_b)):
             return best, NO_SUBSTITUTE, iterations, evaluations
         if status == lay.CONVERGED and length > best:
@@ -168,13 +169,13 @@ def substitute_path(lo, hi, ends, node, tol, direct):
 
 @inlined
 def has_valid_length(status, error):
-    """Return whether a path was found, or a substitute for it, from the status and error in `info`."""
+    """Return whether there is a path or a substitute path, from status and error in `info`."""
     return status == lay.CONVERGED or (status == lay.ENDPOINT_INSIDE and error < NO_SUBSTITUTE)
 
 
 @jit
 def _set_substitute_pull(j, k, point, tangent, normal, binormal, curvature, end, node, base, seg):
-    """Let segment j pull between the surface and its end, at the end: e = (I + h W)^-1 t."""
+    """Make segment j the force of a substitute path between surface and end, acting at the end: e = (I + h W)^-1 t."""
     # height of the end over the contact, negative
     h = 0.0
     for i in range(3):
@@ -185,15 +186,16 @@ def _set_substitute_pull(j, k, point, tangent, normal, binormal, curvature, end,
     along, aside = (1.0 + h * beta) * over, -h * tau * over
     for i in range(3):
         seg[j, G_E + i] = along * node[k, tangent + i] + aside * node[k, binormal + i]
-        # both points of the segment are the end: the surface's body feels the pull there, too
+        # both points of the segment are the end: the force acts there on the surface's body, too
         seg[j, G_A + i + G_B - end] = seg[j, end + i]
 
 
 @jit
 def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
-    """Do `list_segments` for a substitute path: a segment at an end inside has no length, but pulls.
+    """Write the segments of a substitute path as `list_segments` does; the one at an end inside has no length.
 
-    Its vector e is not a unit vector: it is what the length loses as the end moves, see the head of this file.
+    Its vector e is not a unit vector but minus the gradient of the length with respect to the end, see the top of this
+    file.
     """
     count = list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first)
     base = (ox, oy, oz)

@@ -1,8 +1,8 @@
-"""The active set of a span, the obstacles that its path touches: lift-off, touchdown, contacts split and merged.
+"""Changes of the active set, the obstacles that a path touches: lift-off, touchdown, splitting and merging of contacts.
 
-"Touching or not" in docs/derivation.md. A straight segment is tested against a surface in `_penetrates`, by
-`segment_clearance`. A surface with hollows has two rows, as a string may touch it on both sides of a hollow that
-it bridges ("Hollows"): the second one has a number in TOUCH.
+"Touching or not" in docs/derivation.md. `_penetrates` tests a straight segment against a surface, by
+`geometry.dispatch.segment_clearance`. A surface with hollows has two rows, because a string may touch it on both sides
+of a hollow that it bridges ("Hollows"); the second row has TOUCH > 0.
 """
 
 from __future__ import annotations
@@ -24,26 +24,22 @@ FREE, TOUCHED = lay.FREE, lay.TOUCHED
 
 # Lengths are shares of the surface's size.
 MERGE_DISTANCE = 1e-5  # contacts on both sides of a hollow that are nearer to each other than this have met
-MERGE_DISTANCE_ON_FAILURE = (
-    1e-3  # the same where Newton's method fails: a segment that vanishes has no direction
-)
+MERGE_DISTANCE_ON_FAILURE = 1e-3  # the same after Newton's method failed, as on a segment that vanishes
 HOLLOW_SAMPLES = 24  # samples of a geodesic, to find where it runs through a hollow
-PENETRATION_DEPTH = (
-    1e-9  # a segment that goes less deep below a surface counts as touching it, not as entering it
-)
+PENETRATION_DEPTH = 1e-9  # a segment that goes less deep below a surface touches it but does not enter it
 
 
 @jit
 def _has_second_row(k, hi, node):
-    """Return whether the next row is the same surface once more."""
+    """Return whether the next row belongs to the same surface."""
     return k + 1 < hi and node[k + 1, lay.TOUCH] != 0.0
 
 
 @jit
 def follow_branch(lo, hi, node):
-    """Write how far the path sweeps about every surface; return False where that is not the way it went before.
+    """Write the path's winding angle about every surface; return False if it is on another branch than before.
 
-    Of the two contacts of a bridged hollow only their sum is topological, and Newton's method keeps them.
+    With two contacts at a bridged hollow only their sum is topological; Newton's method stays on their branch.
     """
     same = True
     for k in range(lo, hi):
@@ -53,7 +49,7 @@ def follow_branch(lo, hi, node):
             angle = winding_angle(k, node)
             if _has_second_row(k, hi, node) and node[k + 1, S_MODE] == TOUCHED:
                 node[k, S_SWEEP] = angle
-            # another branch differs by whole turns, the same one by rounding: any bound in between will do
+            # another branch differs by whole turns, the same branch by rounding errors; the bound is in between
             elif abs(angle - unwrap_angle(angle, node[k, S_SWEEP])) > 1.0:
                 same = False
             else:
@@ -63,9 +59,9 @@ def follow_branch(lo, hi, node):
 
 @jit
 def remove_contact(k, node):
-    """Remove the contact of row k, which is FREE then."""
+    """Remove the contact of row k, and make the row FREE."""
     node[k, S_MODE] = FREE
-    # zeros: where the straight segment beside the surface runs is not known yet
+    # zeros: the ends of the straight segment are not known yet
     for i in range(7):
         node[k, S_P + i] = 0.0
 
@@ -74,7 +70,7 @@ def remove_contact(k, node):
 def lift_off(lo, hi, node):
     """Remove the contacts whose arc is negative; return how many.
 
-    As the arc goes through zero the contact is a point with e = e' = t, so that length and forces are continuous.
+    Where the arc is zero the contact is a point with e = e' = t, so that length and forces are continuous there.
     """
     removed = 0
     for k in range(lo, hi):
@@ -113,9 +109,9 @@ def _move_to_second_row(k, node):
 
 @jit
 def split_at_hollow(lo, hi, ends, node):
-    """Split the geodesics that run through a hollow, which a string bridges; return how many.
+    """Split the geodesics that run through a hollow, where a string would lift off; return how many.
 
-    The part before the hollow keeps the row, the part behind it goes to the surface's second row.
+    The part before the hollow stays in its row, the part behind it goes to the surface's second row.
     """
     count = 0
     for k in range(lo, hi - 1):
@@ -132,7 +128,7 @@ def split_at_hollow(lo, hi, ends, node):
             if node[k, lay.W_KQ] < 0.0:
                 first = i if first < 0 else first
                 last = i
-        # a geodesic that starts or ends in the hollow is nowhere near a string
+        # a geodesic that starts or ends in the hollow is too far from a real path to be split
         if first <= 0 or last >= HOLLOW_SAMPLES:
             node[k, S_ARC] = arc
             geodesic(k, node, ends[0], ends[1], ends[2])
@@ -154,7 +150,7 @@ def split_at_hollow(lo, hi, ends, node):
         node[k + 1, lay.S_T] = tx
         node[k + 1, lay.S_T + 1] = ty
         node[k + 1, lay.S_T + 2] = tz
-        # the first contact ends one sample before the hollow; Newton's method finds where both really end
+        # the first contact ends one sample before the hollow; Newton's method finds the exact ends of both
         node[k + 1, S_ARC] = arc * (HOLLOW_SAMPLES - last - 1) / HOLLOW_SAMPLES
         node[k, S_ARC] = arc * (first - 1) / HOLLOW_SAMPLES
         geodesic(k, node, ends[0], ends[1], ends[2])
@@ -190,9 +186,10 @@ def merge_contacts(lo, hi, ends, node, distance):
 
 @jit
 def touchdown(lo, hi, ends, node):
-    """Wrap the obstacles that a straight segment enters; return how many, and the status that forbids a path.
+    """Wrap the obstacles that a straight segment enters; return (how many, status).
 
-    The status is CONVERGED where none does. Obstacles are wrapped between the contact points before and after them.
+    The status is CONVERGED unless some obstacle makes a path impossible. Each obstacle is wrapped between the contact
+    points before and after it.
     """
     # (x, y, z): where the straight segment that arrives at row k begins
     x, y, z = ends[3], ends[4], ends[5]
@@ -200,7 +197,7 @@ def touchdown(lo, hi, ends, node):
     status = lay.CONVERGED
     before = -1
     for k in range(lo, hi):
-        # a surface with hollows may be entered by the very segments that touch it
+        # a segment that touches a surface with hollows may enter it elsewhere
         if node[k, S_MODE] == TOUCHED and hollow(k, node):
             if _penetrates(k, node, ends, x, y, z, node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]):
                 if _has_second_row(k, hi, node) and node[k + 1, S_MODE] != TOUCHED:
@@ -224,7 +221,7 @@ def touchdown(lo, hi, ends, node):
         after, qx, qy, qz = _next_contact(k, hi, ends, node)
         held = wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, True)
         if held != 0:
-            # an end counts as inside only where it is the span's; contact points may lie below another surface
+            # only ends of the span count as inside; contact points may lie below another surface
             if (held & A_INSIDE and before < 0) or (held & B_INSIDE and after == hi):
                 status = lay.ENDPOINT_INSIDE
             elif status == lay.CONVERGED:

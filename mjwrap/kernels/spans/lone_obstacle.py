@@ -1,4 +1,4 @@
-"""A lone obstacle with a closed-form wrap: its path without Newton's method, certified as any other."""
+"""A lone obstacle with a closed-form wrap: the path without Newton's method, certified as any other."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ S_MODE, W_OLD = lay.S_MODE, lay.W_OLD
 def solve_lone_obstacle(k, ends, node, tol):
     """Find the path over obstacle k alone, whose wrap has a closed form, on its saved branch.
 
-    Returns whether it is certified as `solve_active_set` certifies it, its length [m] and ||f||; the saved solution
-    stays as it was where it is not.
+    Returns (whether the path passes the checks of `solve_active_set`, length [m], ||f||). Where it does not, the saved
+    solution is left as it was.
     """
     hi = k + 1
     save_solutions(k, hi, node, W_OLD)

@@ -19,7 +19,7 @@ HINT, S_MODE, W_OLD, W_Q, W_Y = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Q, lay.W_
 
 MAX_RESTARTS = 4
 RESTART_PASSES = (
-    7  # passes over the obstacles in the first restart; every further one takes about twice as many
+    7  # passes over the obstacles in the first restart; each further one takes about twice as many
 )
 COLD_RESTART = 2  # number of the restart that forgets all contacts, counted from 0
 SADDLE_SHIFT = 0.3  # how far a path is moved off a saddle, in the surface's size

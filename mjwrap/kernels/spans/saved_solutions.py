@@ -1,4 +1,4 @@
-"""Saved solutions of a span: kept in scratch columns of their rows, and put back from there."""
+"""Copies of a span's saved solutions in scratch columns of their rows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def save_solutions(lo, hi, node, column):
 
 @jit
 def restore_solutions(lo, hi, ends, node, column):
-    """Put the saved solutions of lo..hi back from the columns that begin at `column`, and evaluate their geodesics."""
+    """Restore the saved solutions of lo..hi from the columns that begin at `column`, and evaluate their geodesics."""
     for k in range(lo, hi):
         for i in range(lay.STATE):
             node[k, S_MODE + i] = node[k, column + i]
@@ -38,7 +38,7 @@ def any_in_mode(lo, hi, node, mode):
 
 @jit
 def surface_end(k, hi, node):
-    """Return the row behind the last one of row k's surface, which has two where a string may touch it twice."""
+    """Return the row behind the last row of row k's surface; a surface that may be touched twice has two rows."""
     k += 1
     while k < hi and node[k, lay.TOUCH] > 0.0:
         k += 1

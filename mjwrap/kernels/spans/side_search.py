@@ -1,8 +1,8 @@
-"""Search for the sides on which a path passes its obstacles: cold starts without hints.
+"""Search for the sides on which a path passes its obstacles, at cold starts without hints.
 
-A local search over sides. Every trial is wrapped obstacle after obstacle; where it comes near the present path it is
-pulled tight by Newton's method, and it is kept if it is shorter then. Paths that leave the surfaces' ranges cost more
-than any that does not. "Sides and windings" in docs/derivation.md.
+A local search over sides. In every trial the obstacles are wrapped one after the other. If the trial is at most a
+little longer than the present path, Newton's method makes it tangent, and it is kept if it is shorter then. A path that
+leaves the range of a surface counts as longer than any that does not. "Sides and windings" in docs/derivation.md.
 """
 
 from __future__ import annotations
@@ -33,28 +33,31 @@ S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_Q, W_OLD = lay.W_Q, lay.W_OLD
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
-LEAST_FLIPPED_SWEEP = 0.5 * math.pi  # a string that sweeps less passes on its shorter side [rad]
-MAX_FLIPS = 3  # neighbours that change sides together
-FLIP_NEIGHBOURS = 4  # obstacles to both sides of those that change sides that are free to follow
-MAX_SWEEPS = 4  # over the whole row
-PENALTY = 1e3  # is added to the length of a path that is out of range or not found [m]
-TRIAL_MARGIN = 0.05  # another way that is longer by less, relatively, is pulled tight before it is given up
-TRIAL_TOL = 1e-6  # tangency error at which its length is known
-MAX_CHANGES = 6  # of the set of touched obstacles while a path is pulled tight
-MAX_NEWTON = 15  # steps of Newton's method between two changes
-GROUP = 5  # neighbours that get random hints at once
-GROUP_STEP = 3  # obstacles from one such group to the next
-GROUP_NEIGHBOURS = 2  # obstacles to both sides of a group that are free to follow
-PATTERNS = 12  # of hints that are tried where the row is one group
-PATTERNS_PER_GROUP = 8  # for each group of a longer row
-EXTRA_PATTERNS = 4  # times as many while there is no path, or none in range
-RANDOM_HINT = 2.0  # flag of a random hint, so that it can be taken back
-UNTOUCHED_CHANCE = 0.25  # that a pattern leaves an obstacle untouched
+LEAST_FLIPPED_SWEEP = (
+    0.5 * math.pi
+)  # a winding angle below which a string is on the shorter side already [rad]
+MAX_FLIPS = 3  # largest number of neighbours that change sides together
+FLIP_NEIGHBOURS = 4  # obstacles on each side of them that are wrapped again, too
+MAX_SWEEPS = 4  # largest number of sweeps of side changes over the whole row
+PENALTY = 1e3  # added to the length of a path that is out of range or not found [m]
+# a trial that is longer than the present path by at most this share is made tangent before it is compared
+TRIAL_MARGIN = 0.05
+TRIAL_TOL = 1e-6  # tangency error to which a trial is solved
+MAX_CHANGES = 6  # largest number of changes of the active set while a trial is made tangent
+MAX_NEWTON = 15  # largest number of steps of Newton's method between two changes
+GROUP = 5  # number of neighbours that get random hints at once
+GROUP_STEP = 3  # number of obstacles from the start of one group to the start of the next
+GROUP_NEIGHBOURS = 2  # obstacles on each side of a group that are wrapped again, too
+PATTERNS = 12  # number of random patterns of hints where the row is a single group
+PATTERNS_PER_GROUP = 8  # number of random patterns for each group of a longer row
+EXTRA_PATTERNS = 4  # factor on these numbers while there is no path, or none in range
+RANDOM_HINT = 2.0  # value of the flag HINT that marks a random hint, so that it can be removed
+UNTOUCHED_CHANCE = 0.25  # probability that a pattern leaves an obstacle untouched
 
 
 @jit
 def make_tangent(lo, hi, ends, node):
-    """Make the path over lo..hi tangent, from what it touches now; return whether it is certified, and the evaluations.
+    """Make the path over lo..hi tangent, from its present contacts; return (whether it is certified, evaluations).
 
     As `active_set_method.solve_active_set`, but without restarts and to a larger tolerance: a failed trial is given up.
     """
@@ -84,9 +87,9 @@ def _penalised_length(first, last, part, node):
 
 @jit
 def _try_part(first, last, part, node, before, passes):
-    """Try a start over first..last: return whether its path is shorter than `before` [m], and the evaluations spent."""
+    """Solve a trial over first..last; return (whether its path is shorter than `before` [m], evaluations)."""
     spent = wrap_in_turn(first, last, part, node, passes, False)
-    # wraps in turn leave it a little too long; only what is nearly as short is worth Newton's method
+    # after wrapping in turn the path is still a little too long; much longer trials are given up
     if not path_length(first, last, part, node) < before * (1.0 + TRIAL_MARGIN):
         return False, spent
     good, e = make_tangent(first, last, part, node)
@@ -97,8 +100,8 @@ def _try_part(first, last, part, node, before, passes):
 def _can_change_side(k, node):
     """Return whether obstacle k may be passed on its other side.
 
-    A topological side, known in closed form, that no hint chooses, on an obstacle that is swept by so much that the
-    other way can be shorter, or touched beyond its end.
+    True where the side is topological, the wrap has a closed form, no hint chooses the side, and the other side could
+    be better: the winding angle is large, or the contact is out of range.
     """
     if not (branched(k, node) and closed_form(k, node)) or node[k, HINT] > 0.0:
         return False
@@ -109,7 +112,7 @@ def _can_change_side(k, node):
 
 @jit
 def _can_be_searched(k, node):
-    """Return whether another wrap of obstacle k can be looked for: it is touched, and no hint chooses its side."""
+    """Return whether another wrap of obstacle k may be searched for: it is touched, and no hint chooses its side."""
     if closed_form(k, node) or node[k, HINT] > 0.0 or node[k, lay.TOUCH] > 0.0:
         return False
     return node[k, S_MODE] == TOUCHED
@@ -117,7 +120,7 @@ def _can_be_searched(k, node):
 
 @jit
 def _remove_further_contacts(k, node):
-    """Remove the further contacts of the surface whose first row is k."""
+    """Remove the contacts of all rows but the first, k, of a surface."""
     k += 1
     while k < node.shape[0] and node[k, lay.TOUCH] > 0.0:
         remove_contact(k, node)
@@ -126,10 +129,10 @@ def _remove_further_contacts(k, node):
 
 @jit
 def _change_sides(first, last, node):
-    """Change the sides of the obstacles first..last, or have them searched for anew."""
+    """Change the sides of the obstacles first..last, or mark them to be searched for anew."""
     for j in range(first, last):
         if _can_change_side(j, node):
-            # the other way round is a whole turn less, or more
+            # on the other side the winding angle differs by a whole turn
             node[j, S_SWEEP] -= math.copysign(TWO_PI, node[j, S_SWEEP])
         elif _can_be_searched(j, node):
             node[j, S_MODE] = COLD
@@ -138,7 +141,7 @@ def _change_sides(first, last, node):
 
 @jit
 def _whole_surfaces(lo, hi, first, last, node):
-    """Return first and last, kept within lo..hi and moved so that all rows of a surface are in or out."""
+    """Return first and last, limited to lo..hi and moved so that no surface has rows on both sides of a limit."""
     first, last = max(lo, first), min(hi, last)
     while node[first, lay.TOUCH] > 0.0:
         first -= 1
@@ -160,7 +163,7 @@ def try_other_sides(lo, hi, ends, node, passes):
         changed = False
         for run in range(1, MAX_FLIPS + 1):
             for k in range(lo, hi - run + 1):
-                # a run may hold obstacles that stay as they are, but not at its ends
+                # obstacles inside a run may keep their side, those at its ends may not
                 whole = _can_change_side(k, node) and _can_change_side(k + run - 1, node)
                 if not (whole or (run == 1 and _can_be_searched(k, node))):
                     continue
@@ -183,7 +186,7 @@ def try_other_sides(lo, hi, ends, node, passes):
 
 @jit
 def _pseudo_random(pattern, k, of):
-    """Return a number in [0, 1) that looks random and is the same every time: paths are functions of the pose."""
+    """Return a pseudo-random number in [0, 1), a fixed function of its arguments: equal poses give equal paths."""
     z = (pattern + 1) * 73856093 + (k + 1) * 19349663 + (of + 1) * 83492791
     for _ in range(2):
         z &= 0xFFFFFFFF
@@ -195,7 +198,7 @@ def _pseudo_random(pattern, k, of):
 @jit
 def _draw_hint(k, node, pattern, place_in_row):
     """Start obstacle k cold with a random hint, or leave it untouched."""
-    # further contacts, behind hollows that are bridged, belong to the old path
+    # contacts in further rows belong to the old path
     _remove_further_contacts(k, node)
     if _pseudo_random(pattern, place_in_row, 0) < UNTOUCHED_CHANCE:
         remove_contact(k, node)
@@ -204,7 +207,7 @@ def _draw_hint(k, node, pattern, place_in_row):
         return
     node[k, S_MODE] = COLD
     node[k, S_ARC] = 0.0
-    # a direction evenly distributed on the sphere: z and the angle about it are
+    # a direction uniformly distributed on the sphere: z and the angle about it are uniform
     z = 2.0 * _pseudo_random(pattern, place_in_row, 1) - 1.0
     angle = TWO_PI * _pseudo_random(pattern, place_in_row, 2)
     radius = node[k, SIZE]
@@ -217,7 +220,7 @@ def _draw_hint(k, node, pattern, place_in_row):
 
 @jit
 def _may_be_hinted(k, node):
-    """Return whether obstacle k may get a random hint: it has none of its own."""
+    """Return whether obstacle k may get a random hint: it has no hint, and its class allows it."""
     return node[k, HINT] == 0.0 and node[k, lay.TOUCH] == 0.0 and random_starts(k, node)
 
 
@@ -232,9 +235,9 @@ def _next_surface(k, hi, node):
 
 @jit
 def try_random_hints(lo, hi, ends, node, sound):
-    """Try random hints for a few neighbours at a time, and keep what is shorter; return the evaluations spent.
+    """Try random hints for a few neighbours at a time, and keep shorter paths; return the number of evaluations.
 
-    Their neighbours follow. sound: the present path is certified.
+    The neighbours of the group are wrapped again, too. sound: the present path is certified.
     """
     spent = 0
     changed = False
@@ -263,7 +266,7 @@ def try_random_hints(lo, hi, ends, node, sound):
                     hinted = True
             if not hinted:
                 continue
-            # the first wrap uses the hints; from there on the path keeps its sides without them
+            # only the first wrap uses the hints; afterwards the path keeps its sides without them
             spent += wrap_in_turn(first, last, part, node, 1, False)
             for j in range(k, end):
                 if node[j, HINT] == RANDOM_HINT:
@@ -285,10 +288,10 @@ def try_random_hints(lo, hi, ends, node, sound):
 
 @jit
 def search_sides(lo, hi, ends, node, passes):
-    """Find the sides of a row without hints; return the evaluations spent.
+    """Find the sides of a row without hints; return the number of evaluations.
 
-    Three starts are shortened: wraps between the span's ends, wraps along the obstacles' centres, and the other side of
-    everything that the shorter of these has. The shortest is pulled tight, then random hints are tried.
+    There are three starts: wraps between the span's ends, wraps along the obstacles' centres, and the other sides of
+    the shorter of these two. The best result is made tangent, then random hints are tried.
     """
     spent = 0
     best = math.inf

@@ -1,9 +1,11 @@
-"""Warm starts: Newton's method follows small moves; large ones are followed in strides, lost paths searched for anew.
+"""Entry point for one span: warm start, continuation over large moves, cold start, end inside a surface (`solve_span`).
 
-A saved solution says where the string ran beside every surface, in the surface's own frame: along the segment that
-it left free, or along the tangents of its contact. Where the ends of that string have moved far, the surface alone is
-wrapped again and again while they move there in a straight line, so that it catches a string that it is pulled
-through on the side on which it was, as it does in small steps.
+After a small move Newton's method starts from the saved solution. After a large move it could end on another side of a
+surface than a continuous motion would. The saved solution says where the string ran relative to every surface, in the
+surface's own frame: along the free segment, or along the tangents of the contact. So for each surface alone the ends of
+the string are moved from there to their present places, in a straight line and in small steps, and the path is solved
+at each step (continuation). The result is the side on which a slow motion would leave the string. Where this fails, the
+path is searched for as at a cold start.
 """
 
 from __future__ import annotations
@@ -25,26 +27,27 @@ S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T
 W_OLD, W_START, W_START_ERROR = lay.W_OLD, lay.W_START, lay.W_START_ERROR
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 
-# Move of a free string's ends, in the surface's size, up to which it meets the surface on the side on which it was.
-FREE_MOVE = 0.25
-LARGE_ERROR = 0.1  # tangency error of an obstacle's old contact beyond which the move is a large one
-CONTACT_MOVE = 0.5  # of a contact on its surface, in its size, likewise
-CONTINUATION_STEP = 0.05  # of a string's ends in a large move, in the surface's size
+# A move is large if one of these bounds is exceeded; lengths are shares of the surface's size.
+FREE_MOVE = 0.25  # move of the ends of a free string
+CONTACT_MOVE = 0.5  # move of a contact point on its surface
+LARGE_ERROR = 0.1  # tangency error of the old contacts in the new pose, per obstacle
+# a free string may also move by this share of its height over the surface, which it cannot have passed then
+CLEARANCE_SHARE = 0.5
+CONTINUATION_STEP = 0.05  # step of a string's ends in a continuation, as a share of the surface's size
 MAX_CONTINUATION_STEPS = 100.0
-CLEARANCE_SHARE = 0.5  # share of a segment's height over the surface by which it cannot have passed through
 
 
 @jit
 def _is_found(status):
-    """Return whether there is a path, or is none on the branch that the path is on."""
+    """Return whether there is a path, or it is known that there is none on the present branch."""
     return status == lay.CONVERGED or status == lay.OUT_OF_RANGE or status == lay.NO_GEODESIC
 
 
 @jit
 def _free_string_moved_far(k, end, now, node):
-    """Return whether the free string beside row k has moved so far that it may have gone through the surface.
+    """Return whether a string that does not touch row k has moved so far that it may have passed through the surface.
 
-    now: its ends as of a span. W_OLD holds where it ran before, in S.
+    now: its present ends, as `ends` of a span. W_OLD holds its ends before, in S.
     """
     if node[k, W_OLD] != FREE:
         return False
@@ -56,7 +59,7 @@ def _free_string_moved_far(k, end, now, node):
     known = abs(node[k, j]) + abs(node[k, j + 1]) + abs(node[k, j + 2]) > 0.0
     a = (ax - node[k, i]) ** 2 + (ay - node[k, i + 1]) ** 2 + (az - node[k, i + 2]) ** 2
     b = (bx - node[k, j]) ** 2 + (by - node[k, j + 1]) ** 2 + (bz - node[k, j + 2]) ** 2
-    # one that runs high over the surface may move further
+    # a string that runs high over the surface may move further
     clear = FREE_MOVE * node[k, SIZE]
     if not any_in_mode(k, end, node, TOUCHED):
         clear = max(clear, CLEARANCE_SHARE * node[k, lay.W_CLEARANCE])
@@ -65,7 +68,7 @@ def _free_string_moved_far(k, end, now, node):
 
 @jit
 def _contact_moved_far(k, node):
-    """Return whether the contact of row k has gone so far on its surface that it may be another one."""
+    """Return whether the contact of row k has moved so far on its surface that it may be another one."""
     if node[k, W_OLD] != TOUCHED or node[k, S_MODE] != TOUCHED:
         return False
     i = W_OLD + S_P - S_MODE
@@ -75,7 +78,7 @@ def _contact_moved_far(k, node):
 
 @jit
 def _moved_far(lo, hi, ends, node):
-    """Return whether a path just found is so far from the one before that it may have missed a surface or a side."""
+    """Return whether the path just found is so far from the one before that it may be on another side of a surface."""
     follows = False
     for k in range(lo, hi):
         if closed_form(k, node) or node[k, lay.TOUCH] > 0.0:
@@ -93,9 +96,9 @@ def _moved_far(lo, hi, ends, node):
 
 @jit
 def _previous_ends(k, end, now, node):
-    """Return whether it is known where the string ran beside rows k..end, and its ends then, as of a span.
+    """Return (whether they are known, the string's ends at rows k..end in the last solution, as `ends` of a span).
 
-    Relative to the surface, so that they have moved with it. Rows k..end are those of one surface.
+    They are fixed in the frame of the surface, so that they have moved with it. Rows k..end are those of one surface.
     """
     first, last = -1, -1
     for j in range(k, end):
@@ -132,9 +135,9 @@ def _previous_ends(k, end, now, node):
 
 @jit
 def _continue_to_present_ends(k, end, now, node, tol):
-    """Move the string over rows k..end from where it ran to its present ends `now`; return the evaluations spent.
+    """Move the string over rows k..end from its previous ends to its present ends `now`; return the evaluations.
 
-    A continuation: the surface alone is solved at every stride, from the solution of the one before.
+    A continuation: the surface alone is solved at every step, from the solution of the step before.
     """
     known, old = _previous_ends(k, end, now, node)
     if not known:
@@ -153,7 +156,7 @@ def _continue_to_present_ends(k, end, now, node, tol):
         )  # fmt: skip
         status, _, _, _, e = solve_active_set(k, end, part, node, tol, False)
         spent += e
-        # the straight line of an end leads through the surface: what was found so far is worth nothing
+        # the straight line of an end leads through the surface: the continuation has failed
         if status == lay.ENDPOINT_INSIDE:
             restore_solutions(k, end, now, node, W_START)
             break
@@ -162,9 +165,10 @@ def _continue_to_present_ends(k, end, now, node, tol):
 
 @no_inline
 def _solve_by_continuation(lo, hi, ends, node, tol, direct, found):
-    """Solve again, by continuation from before a large move; where that fails, from a cold start.
+    """Solve again after a large move, by continuation from the last pose; where that fails, from a cold start.
 
-    found: the solve just done has found a path, which is kept where strides lead to none.
+    found: the solve before has found a path; where the continuation fails, the solution before the move is used again
+    instead of a cold start.
     """
     evaluations = 0
     restore_solutions(lo, hi, ends, node, W_OLD)
@@ -186,7 +190,7 @@ def _solve_by_continuation(lo, hi, ends, node, tol, direct, found):
         status, total, error, i, e = solve_active_set(lo, hi, ends, node, tol, direct)
         iterations += i
         evaluations += e
-    # `chain.solve_motion` reads this as: the extrapolated start was no good
+    # `chain.solve_motion` takes this as a sign that the extrapolated start was bad
     node[lo, lay.W_RESTARTS] += 1.0
     if status != lay.CONVERGED:
         for k in range(lo, hi):
@@ -200,8 +204,8 @@ def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
-    leaves the new one in its place; a path that is lost is searched for as at a cold start. With `direct` a lone
-    obstacle is wrapped in closed form whatever is saved but its branch. Where an end lies inside a surface, length,
+    replaces it by the new one; a path that is lost is searched for as at a cold start. With `direct` a lone obstacle is
+    wrapped in closed form; of its saved solution only the branch is used. Where an end lies inside a surface, length,
     error and saved solution are those of the substitute path (`end_inside.py`).
     """
     warm = not any_in_mode(lo, hi, node, COLD)
@@ -209,7 +213,7 @@ def solve_span(lo, hi, ends, node, tol, direct):
         good, total, error = solve_lone_obstacle(lo, ends, node, tol)
         if good:
             return lay.CONVERGED, total, error, 0, 1
-    # Newton's method writes the error of its very first evaluation there, by which `_moved_far` judges the start
+    # Newton's method writes the error of its first evaluation here; `_moved_far` reads it
     node[lo, W_START_ERROR] = -1.0
     status, total, error, iterations, evaluations = solve_active_set(lo, hi, ends, node, tol, direct)
     if _is_found(status) and not (warm and _moved_far(lo, hi, ends, node)):

@@ -1,8 +1,19 @@
-"""The Newton system of a span, J d = -h, solved by a block elimination (Thomas sweep) in a time linear in obstacles.
+"""The Newton system of a span, J d = -h, solved by block elimination (Thomas algorithm) in linear time.
 
-Block row k holds h of obstacle k, block column k its variations δ0..δ3. A straight segment couples neighbours alone, so
-that J is block tridiagonal with 4 x 4 blocks. The block below the diagonal fills rows 0 and 1, the one above rows 2
-and 3 and columns 0 and 1 only; each block is therefore eliminated by hand instead of by a general 4 x 4 solve.
+h is the path error (31) of Muñoz-Pepi et al. (2023), J its Jacobian in the natural geodesic variations. Block row k
+holds h of obstacle k, block column k its variations δ0..δ3. A straight segment couples only neighbours, so that J is
+block tridiagonal with 4 x 4 blocks. `path_error.py` has the coefficients n_slide ... b_turn of rows 0 and 1 in δ0, δ1,
+δ2, and q_n_slide ... q_b_turn of rows 2 and 3 in σ = δ0 + δ3, y = a δ1 + r δ2 and v = a' δ1 + r' δ2. By the chain rule
+the block on the diagonal is
+
+             δ0          δ1                            δ2                            δ3
+    row 0    n_slide     n_shift                       0                             0
+    row 1    b_slide     b_shift                       b_turn                        0
+    row 2    q_n_slide   q_n_shift a                   q_n_shift r                   q_n_slide
+    row 3    q_b_slide   q_b_shift a + q_b_turn a'     q_b_shift r + q_b_turn r'     q_b_slide
+
+The block below the diagonal has only rows 0 and 1, in σ and y of the obstacle before; the block above it has only rows
+2 and 3, in δ0 and δ1 of the obstacle behind. So each block is eliminated by explicit formulas, not by a general solver.
 """
 
 from __future__ import annotations
@@ -37,8 +48,8 @@ def solve_newton_system(lo, hi, node):
         cosine = -b_turn
         right_n, right_b = -node[k, W_CP + 1], -node[k, W_CP + 2]
         if last >= 0:
-            # forward elimination: the step of `last` is Y - X (δ0, δ1) of k. Its σ and y follow from both, and go to
-            # the right-hand side and to the diagonal block
+            # forward elimination: the step of `last` is Y - X (δ0, δ1), with (δ0, δ1) of k. The parts of its σ and y
+            # from Y go to the right-hand side, those from X to the diagonal block
             l_n_slide, l_n_shift, l_b_slide, l_b_shift = path_error_jacobian_of_previous(k, last, node)
             a, r = node[last, W_JAC], node[last, W_JAC + 2]
             sigma = node[last, W_Y] + node[last, W_Y + 3]
@@ -60,19 +71,20 @@ def solve_newton_system(lo, hi, node):
         a, da, r, dr = node[k, W_JAC], node[k, W_JAC + 1], node[k, W_JAC + 2], node[k, W_JAC + 3]
         if n_slide == 0.0 or cosine == 0.0:
             return False
-        # Rows 0 and 1 give all in terms of δ1, as 0-part plus 1-part times δ1. The 1-parts:
-        #   row 0: δ0;  row 1: δ2;  y = a δ1 + r δ2;  v = a' δ1 + r' δ2
+        # Rows 0 and 1 of the diagonal block (top of this file) give δ0 and δ2 as functions of δ1, and so y and v:
+        #   δ0 = slide0 + slide1 δ1,   δ2 = turn0 + turn1 δ1,   y = y0 + y1 δ1,   v = v0 + v1 δ1
         slide1 = -n_shift / n_slide
         turn1 = (b_shift + b_slide * slide1) / cosine
         y1 = a + r * turn1
         v1 = da + dr * turn1
-        # what is left are rows 2 and 3 in σ and δ1:  q_n_slide σ + q_n_shift y1 δ1,  q_b_slide σ + bottom δ1
+        # rows 2 and 3 are left, with σ and δ1 as unknowns:
+        #   q_n_slide σ + q_n_shift y1 δ1,   q_b_slide σ + bottom δ1,   bottom = q_b_shift y1 + q_b_turn v1
         bottom = q_b_shift * y1 - q_cosine * v1
         determinant = q_n_slide * bottom - q_b_slide * q_n_shift * y1
         if determinant == 0.0 or not math.isfinite(determinant):
             return False
         over = 1.0 / determinant
-        # the 0-parts, from the right-hand side -h, and Y = (δ0, δ1, δ2, σ - δ0) by Cramer's rule
+        # slide0, turn0, y0, v0 from the right-hand side -h; then Y = (δ0, δ1, δ2, σ - δ0) by Cramer's rule
         slide0 = right_n / n_slide
         turn0 = (b_slide * slide0 - right_b) / cosine
         y0, v0 = r * turn0, dr * turn0
@@ -84,7 +96,7 @@ def solve_newton_system(lo, hi, node):
         node[k, W_Y + 1] = d1
         node[k, W_Y + 2] = turn0 + turn1 * d1
         node[k, W_Y + 3] = sigma - node[k, W_Y]
-        # X: the same for the two columns of the block above the diagonal, whose rows 0 and 1 are zero
+        # X: the same with the two columns of the block above the diagonal, whose rows 0 and 1 are zero
         following = _next_touched(k, hi, node)
         if following >= 0:
             u_n_slide, u_n_shift, u_b_slide, u_b_shift = path_error_jacobian_of_next(k, following, node)

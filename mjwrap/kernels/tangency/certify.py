@@ -1,9 +1,9 @@
-"""The certificate's second part: whether a tangent path is a local minimum of length, and which way down it is if not.
+"""Second-order part of the certificate: whether a tangent path is a local minimum of length, and a descent if not.
 
-At a tangent path the second variation of the length lives in sideways shifts x b_P and y b_Q of the contact points
-alone. Straight segments of length L add |x b_P - y b_Q|²/L, geodesics (a x² - 2xy + r' y²)/r. Eliminated from the
-origin on, it is a Riccati recursion in the stiffness against a sideways shift of each point, all before it free to
-follow:
+At a tangent path the second variation of the length depends only on sideways shifts x b_P and y b_Q of the contact
+points. Straight segments of length L add |x b_P - y b_Q|²/L, geodesics (a x² - 2xy + r' y²)/r. Elimination from
+the origin on gives a Riccati recursion for the stiffness k against a sideways shift of each point, where all points
+before it are free to move:
 
     at the first P    k = 1/L
     along a geodesic  k_Q = (a' + k_P r') / (a + k_P r)
@@ -21,16 +21,15 @@ from mjwrap.kernels.compilation.jit import inlined, jit
 S_MODE, TOUCHED, SIZE = lay.S_MODE, lay.TOUCHED, lay.SIZE
 W_BP, W_BQ, W_JAC, W_L, W_LQ, W_X, W_Y = lay.W_BP, lay.W_BQ, lay.W_JAC, lay.W_L, lay.W_LQ, lay.W_X, lay.W_Y
 
-LEAST_STIFFNESS = (
-    -1e-9
-)  # smallest admitted stiffness against a sideways shift, as a share of the segment's own
+# smallest admitted stiffness against a sideways shift, as a share of the stiffness of the segment alone
+LEAST_STIFFNESS = -1e-9
 LEAST_CURVATURE = -1e-9  # smallest admitted normal curvature times the surface's size
 SHORTEST = 1e-12  # segments count as at least this long here [m]
 
 
 @inlined
 def _binormals_cosine(last, k, node):
-    """Return b_Q of obstacle `last` times b_P of obstacle k."""
+    """Return b_Q·b_P, with b_Q of obstacle `last` and b_P of obstacle k."""
     return (
         node[last, W_BQ] * node[k, W_BP]
         + node[last, W_BQ + 1] * node[k, W_BP + 1]
@@ -42,14 +41,15 @@ def _binormals_cosine(last, k, node):
 def is_local_minimum(lo, hi, node):
     """Return whether the path of the last evaluation is a local minimum of length.
 
-    Besides the sideways shifts, the string must not gain by lifting off: its normal curvature is nowhere negative.
+    Besides the condition on sideways shifts, the normal curvature must not be negative anywhere on a geodesic: there
+    the string would lift off and become shorter.
     """
     last = -1
     stiffness = 0.0
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED:
             continue
-        # over the segment to P: of the origin, which is fixed, or of the obstacle before
+        # over the segment that arrives at P, from the fixed origin or from the obstacle before
         segment = 1.0 / max(node[k, W_L], SHORTEST)
         if last < 0:
             stiffness = segment
@@ -59,7 +59,7 @@ def is_local_minimum(lo, hi, node):
                 return False
             cosine = _binormals_cosine(last, k, node)
             stiffness = segment - cosine * cosine * segment * segment / pivot
-        # a conjugate point within the geodesic, or a hollow
+        # a conjugate point on the geodesic, or a hollow below it
         if node[k, lay.W_RMIN] <= 0.0 or node[k, lay.W_KMIN] < LEAST_CURVATURE / node[k, SIZE]:
             return False
         # along the geodesic to Q
@@ -79,14 +79,14 @@ def is_local_minimum(lo, hi, node):
 def shift_off_saddle(lo, hi, node, size):
     """Write to W_Y + 1 and W_Y + 2 a variation (δ1, δ2) by which the path of the last evaluation gets shorter.
 
-    The first pivot that is not positive, of those in `is_local_minimum`, gives a direction of negative curvature in the
-    shifts x, y of P and Q, up to that obstacle. Scaled to `size`, in radii. Returns that obstacle, or -1 where there is
-    none.
+    The first pivot of `is_local_minimum` that is not positive gives a direction of negative second variation in the
+    shifts x, y of P and Q of all obstacles up to its own. The largest shift is `size` times the surface's size. Returns
+    that obstacle, or -1 where all pivots are positive.
     """
     last = -1
     stiffness = 0.0
     failed, at_q = -1, False
-    # forward: the recursion, and how the points before follow: y of `last` for x = 1 here (W_X), x for y = 1 (W_X + 1)
+    # forward: the recursion; W_X is the shift y of `last` for x = 1 here, W_X + 1 the shift x here for y = 1
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED:
             continue
@@ -113,7 +113,7 @@ def shift_off_saddle(lo, hi, node, size):
         failed, at_q = last, True
     if failed < 0:
         return -1
-    # backward: the shifts that go with one of the point whose pivot failed
+    # backward: the shifts that go with a unit shift of the point whose pivot failed
     x, y = 1.0, 0.0
     if at_q:
         x, y = node[failed, W_X + 1], 1.0

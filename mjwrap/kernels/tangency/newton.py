@@ -1,8 +1,8 @@
 """Newton's method on the path error h of all touched obstacles of a span: init, step, terminate.
 
-A step solves J d = -h for the natural variations of every geodesic (`block_elimination.py`, with the formulas in
-`path_error.py`). It is taken with h and judged by the tangency error ||f|| (18), which the folded path e = -t does not
-satisfy though h is zero there: a step that does not reduce ||f|| is halved.
+A step solves J d = -h for the natural geodesic variations of every obstacle (`block_elimination.py`, with the formulas
+in `path_error.py`). It is accepted by the tangency error ||f|| (18), because h is zero on a path that folds back
+(e = -t) as well: a step that does not reduce ||f|| is halved.
 """
 
 from __future__ import annotations
@@ -19,22 +19,16 @@ from mjwrap.kernels.tangency.path_error import dot_columns
 from mjwrap.kernels.tangency.tangency_error import connect_segments, ends_on_surface, evaluate
 
 S_MODE, S_P, S_ARC, SIZE = lay.S_MODE, lay.S_P, lay.S_ARC, lay.SIZE
-W_E, W_L, W_NP, W_Y, W_SAVE, W_START_ERROR = (
-    lay.W_E,
-    lay.W_L,
-    lay.W_NP,
-    lay.W_Y,
-    lay.W_SAVE,
-    lay.W_START_ERROR,
-)
+W_E, W_L, W_NP, W_Y, W_SAVE = lay.W_E, lay.W_L, lay.W_NP, lay.W_Y, lay.W_SAVE
+W_START_ERROR = lay.W_START_ERROR
 TOUCHED = lay.TOUCHED
 
-AT_END = 1e-11  # a contact nearer than this share of the size to an end on the surface is at it
+AT_END = 1e-11  # a contact nearer to an end on the surface than this share of the size has reached the end
 MAX_TURN = 0.5  # largest change of direction in one step [rad]
-MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in radii
-MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in radii
+MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in the surface's size
+MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in the surface's size, beside half its arc
 MAX_HALVINGS = 6
-# What the rows hold of their start, in the place of ||f||^2: nothing, or evaluated geodesics without segments.
+# Values of `square` where ||f||^2 of the start is not known: nothing is evaluated, or the geodesics alone are.
 NOT_EVALUATED, GEODESICS_EVALUATED = -1.0, -2.0
 
 
@@ -43,7 +37,7 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     """Iterate until ||f|| <= tol; return (||f||, iterations, evaluations), the last state left in the rows.
 
     square: ||f||^2 where the rows hold the evaluation of their start, else NOT_EVALUATED or GEODESICS_EVALUATED. The
-    iteration stops as well where the Newton system is singular and where halving a step does not help.
+    iteration also stops where the Newton system is singular, and where no shortened step reduces ||f||.
     """
     square, evaluations = init(lo, hi, ends, node, square)
     iterations = 0
@@ -57,7 +51,7 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
 
 @inlined
 def init(lo, hi, ends, node, square):
-    """Evaluate the start as far as the rows do not hold it; return (||f||^2, evaluations)."""
+    """Evaluate what the rows do not yet hold of their start; return (||f||^2, evaluations)."""
     evaluations = 0
     if square < 0.0:
         if square == GEODESICS_EVALUATED:
@@ -97,7 +91,7 @@ def step(lo, hi, ends, node, square):
         share *= 0.5
     if not trial < square:
         return False, square, 1, evaluations
-    # a contact that has come to an end on the surface stays there from now on
+    # a contact that has reached an end on the surface stays there from now on
     if _start_at_end_on_surface(lo, hi, ends, node):
         trial = evaluate(lo, hi, ends, node)
         evaluations += 1
@@ -112,9 +106,9 @@ def terminate(square, iterations, tol, max_iterations):
 
 @jit
 def _step_limit(lo, hi, node):
-    """Return the share of the Newton step that keeps every obstacle's change moderate.
+    """Return the largest share, at most 1, of the Newton step that stays within the limits of every obstacle.
 
-    The linearisation says nothing beyond about half a radius; one share for all keeps the direction of the step.
+    Beyond about half a radius the linearisation is not valid. One share for all obstacles keeps the step's direction.
     """
     worst = 1.0
     for k in range(lo, hi):
@@ -130,7 +124,7 @@ def _step_limit(lo, hi, node):
 
 @jit
 def _save(lo, hi, node):
-    """Keep P, t and s of every row, from which the trials of a step start."""
+    """Save P, t and s of every row; the trials of a step start from them."""
     for k in range(lo, hi):
         for i in range(7):
             node[k, W_SAVE + i] = node[k, S_P + i]
@@ -155,9 +149,9 @@ def _move(lo, hi, share, node):
 
 @jit
 def _start_at_end_on_surface(lo, hi, ends, node):
-    """Where the path starts on the surface that it meets first, start the geodesic there; return whether it did.
+    """If the path starts on the surface that it touches first, start the geodesic there; return whether it was moved.
 
-    The straight segment has no direction then: the contact stays, and what is left to solve for is the other end.
+    There is no straight segment then: the first contact point is known, and the other end is left to solve for.
     """
     for k in range(lo, hi):
         if node[k, S_MODE] != TOUCHED:

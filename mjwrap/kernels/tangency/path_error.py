@@ -1,12 +1,12 @@
-"""The path error h of one obstacle beside its Jacobian: the formulas on which Newton's method works.
+"""The path error h of one obstacle and its Jacobian, with which Newton's method computes its steps.
 
-The path error has four numbers for each touched obstacle (Scholz; paper (31)),
+The path error has four numbers for each touched obstacle (Muñoz-Pepi et al. 2023, (31), after Scholz et al. 2016),
 
-    h = [e·n_P, e·b_P, e'·n_Q, e'·b_Q]
+    h = [e·n_P, e·b_P, e'·n_Q, e'·b_Q],
 
 with e the unit vector of the straight segment that arrives at P, e' of the one that leaves Q. The geodesic moves by
-four natural variations: δ0 slides it along t, δ1 shifts its start along b, δ2 turns it from t towards b, δ3 lengthens
-it. With the shape operator's κ = t·Wt, τ = t·Wb, β = b·Wb at P and at Q, and Jacobi fields a, a', r, r' at Q,
+four natural geodesic variations: δ0 slides it along t, δ1 shifts its start along b, δ2 turns it from t towards b, δ3
+lengthens it. With the shape operator's κ = t·Wt, τ = t·Wb, β = b·Wb at P and at Q, and Jacobi fields a, a', r, r' at Q,
 
     dP = t δ0 + b δ1                              dQ = t σ + b y,    σ = δ0 + δ3,  y = a δ1 + r δ2
     dn_P = (κt + τb) δ0 + (τt + βb) δ1            dn_Q = (κt + τb) σ + (τt + βb) y
@@ -18,6 +18,9 @@ A segment of length L turns by D = (I - e eᵀ)/L times the motion of its far en
 
 where a segment's other end is on a touched obstacle too, that end enters with the opposite sign. Derivation: "How a
 geodesic moves" and "Newton's step" in docs/derivation.md.
+
+Where the path ends on the surface itself, at Q, there is no segment e'. Rows 2 and 3 of h are then the components of
+Q - B along t_Q and b_Q (`path_error_at_end_on_surface`).
 """
 
 from __future__ import annotations
@@ -27,15 +30,8 @@ from mjwrap.kernels.compilation.jit import inlined
 
 W_TP, W_TQ, W_NP, W_NQ, W_BP, W_BQ = lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ, lay.W_BP, lay.W_BQ
 W_KP, W_KQ = lay.W_KP, lay.W_KQ
-W_E, W_EQ, W_L, W_LQ, W_CP, W_CQ, W_END_ON_SURFACE = (
-    lay.W_E,
-    lay.W_EQ,
-    lay.W_L,
-    lay.W_LQ,
-    lay.W_CP,
-    lay.W_CQ,
-    lay.W_END_ON_SURFACE,
-)
+W_E, W_EQ, W_L, W_LQ, W_CP, W_CQ = lay.W_E, lay.W_EQ, lay.W_L, lay.W_LQ, lay.W_CP, lay.W_CQ
+W_END_ON_SURFACE = lay.W_END_ON_SURFACE
 
 SHORTEST = 1e-150  # keeps the reciprocal of a vanishing segment finite [m]
 
@@ -96,7 +92,7 @@ def path_error_jacobian_at_Q(k, node):
     """Return (n_slide, n_shift, b_slide, b_shift, b_turn), the derivatives of rows 2 and 3 of h in σ, y, v.
 
     d(e'·n_Q) = n_slide σ + n_shift y,  d(e'·b_Q) = b_slide σ + b_shift y + b_turn v. Where the path ends at Q on the
-    surface (W_END_ON_SURFACE), h holds how far Q is beyond that end along t and b, and the rows are σ and y themselves.
+    surface (W_END_ON_SURFACE): `path_error_jacobian_at_end_on_surface`.
     """
     kappa, tau, beta = node[k, W_KQ], node[k, W_KQ + 1], node[k, W_KQ + 2]
     along, normal, binormal = node[k, W_CQ], node[k, W_CQ + 1], node[k, W_CQ + 2]  # e'·t, e'·n, e'·b
@@ -110,8 +106,26 @@ def path_error_jacobian_at_Q(k, node):
     # row e'·b, shift: -b·D' b - β e'·n
     b_shift = -beta * normal - (1.0 - binormal * binormal) * over
     if node[k, W_END_ON_SURFACE] != 0.0:
-        n_slide, n_shift, b_slide, b_shift = 1.0, 0.0, 0.0, 1.0
+        n_slide, n_shift, b_slide, b_shift = path_error_jacobian_at_end_on_surface()
     return n_slide, n_shift, b_slide, b_shift, -along
+
+
+@inlined
+def path_error_at_end_on_surface(along, binormal, size):
+    """Return (Q - B)·t_Q and (Q - B)·b_Q [m], rows 2 and 3 of h where the path ends on the surface, at Q.
+
+    along, binormal: e'·t_Q and e'·b_Q of the segment from Q to the end B, `size` long [m], so that Q - B = -size e'.
+    """
+    return -size * along, -size * binormal
+
+
+@inlined
+def path_error_jacobian_at_end_on_surface():
+    """Return (n_slide, n_shift, b_slide, b_shift), the derivatives of `path_error_at_end_on_surface` in σ and y.
+
+    dQ = t σ + b y, and t and b turn by terms in Q - B, which vanishes at the solution: the rows are σ and y themselves.
+    """
+    return 1.0, 0.0, 0.0, 1.0
 
 
 @inlined
@@ -132,7 +146,7 @@ def path_error_jacobian_of_previous(k, last, node):
 
 @inlined
 def path_error_jacobian_of_next(k, following, node):
-    """Return (n_slide, n_shift, b_slide, b_shift): rows 2 and 3 of obstacle k's h in δ0 and δ1 of the one behind.
+    """Return (n_slide, n_shift, b_slide, b_shift): rows 2 and 3 of obstacle k's h in δ0 and δ1 of `following`.
 
     The far end of the segment that leaves k moves by dP = t δ0 + b δ1 of that obstacle: n·D' dP, b·D' dP.
     """

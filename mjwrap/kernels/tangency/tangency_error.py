@@ -1,7 +1,8 @@
-"""Evaluation of a span: geodesics, the straight segments between them, the path error h and the tangency error.
+"""Evaluation of a span: geodesics, segments, tangency error, path error h; h's Jacobian is in `path_error.py`.
 
 The tangency error is ||f||, f = [e - t_P, e' - t_Q] for every touched obstacle (18), over the whole span (30). Newton's
-method steps with h and is judged by f, which is not zero on the folded path e = -t.
+method computes its steps from h and accepts them by f, because h is zero on a path that folds back (e = -t) as well.
+Numbers in parentheses: Muñoz-Pepi et al. (2023).
 """
 
 from __future__ import annotations
@@ -11,7 +12,12 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import inlined, jit
 from mjwrap.kernels.geometry.geodesics import geodesic
-from mjwrap.kernels.tangency.path_error import SHORTEST, path_error_at_P, path_error_at_Q
+from mjwrap.kernels.tangency.path_error import (
+    SHORTEST,
+    path_error_at_end_on_surface,
+    path_error_at_P,
+    path_error_at_Q,
+)
 
 S_MODE, SIZE, TOUCHED = lay.S_MODE, lay.SIZE, lay.TOUCHED
 W_P, W_Q, W_TP, W_TQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
@@ -19,12 +25,11 @@ W_E, W_L, W_CP, W_CQ, W_LQ, W_EQ = lay.W_E, lay.W_L, lay.W_CP, lay.W_CQ, lay.W_L
 W_END_ON_SURFACE, W_END_TARGET = lay.W_END_ON_SURFACE, lay.W_END_TARGET
 
 ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
-LEAST_HEIGHT = 2e-12  # an end point lower above the surface than this share of the size lies on it
-END_DISTANCE_SCALE = (
-    0.01  # Q so far off an end on the surface, in its size, counts like a direction that is off by 1 rad
-)
-CORNER = 1e-6  # half the angle between two contacts that meet, beyond which they do not go on into each other [rad]
-POINT_ROUNDING = 4e-16  # of a point [m]: over a segment's length it bounds what its direction can say
+LEAST_HEIGHT = 2e-12  # an end point less high above the surface than this share of the size lies on it
+# distance of Q from an end on the surface, as a share of the size, that counts as a direction error of 1 rad
+END_DISTANCE_SCALE = 0.01
+CORNER = 1e-6  # two contacts that meet form a corner if half the angle between them is larger [rad]
+POINT_ROUNDING = 4e-16  # rounding error of a point [m]; divided by a segment's length, that of its direction
 
 
 @jit
@@ -43,7 +48,7 @@ def evaluate(lo, hi, ends, node):
 def connect_segments(lo, hi, ends, node):
     """Put straight segments between the geodesics that the rows hold; write e, e' and h, and return ||f||^2.
 
-    Where an end point lies on a surface there is no straight segment whose direction could differ from t.
+    Where an end point of the span lies on the surface there is no straight segment, and no error there.
     """
     _, _, _, x, y, z, bx, by, bz = ends
     total = 0.0
@@ -77,7 +82,7 @@ def connect_segments(lo, hi, ends, node):
         node[k, W_CP + 1] = normal
         node[k, W_CP + 2] = binormal
         corner = meets and (1.0 - along) ** 2 + normal * normal + binormal * binormal > CORNER**2
-        # a corner counts in full, however short the segment at it is
+        # a corner counts in full, also where the segment is short
         total += _error_share(along, normal, binormal, 1.0 if corner else size)
         if last >= 0:
             total += _enter_leaving_segment(last, dx, dy, dz, size, False, node)
@@ -93,9 +98,10 @@ def connect_segments(lo, hi, ends, node):
 
 @jit
 def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
-    """Write the straight segment that leaves obstacle j, the path's last one or not; return its share of ||f||^2.
+    """Write the straight segment that leaves obstacle j; return its share of ||f||^2.
 
-    Where the path ends on the surface its share is that of the way from Q to its end.
+    last: j is the last touched obstacle. Where the path ends on its surface, the share measures the distance from Q to
+    the end B instead.
     """
     node[j, W_EQ] = ex
     node[j, W_EQ + 1] = ey
@@ -104,11 +110,10 @@ def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
     node[j, W_END_ON_SURFACE] = 0.0
     along, normal, binormal = path_error_at_Q(j, node)
     if last and (node[j, W_END_TARGET] != 0.0 or ends_on_surface(j, normal, size, node)):
-        # rows 2 and 3 of h become the components of Q - B along t_Q and b_Q: a vanishing segment has no direction
+        # a vanishing segment has no direction: rows 2 and 3 of h are components of Q - B
         node[j, W_END_ON_SURFACE] = 1.0
         node[j, W_CQ] = 0.0
-        node[j, W_CQ + 1] = -size * along
-        node[j, W_CQ + 2] = -size * binormal
+        node[j, W_CQ + 1], node[j, W_CQ + 2] = path_error_at_end_on_surface(along, binormal, size)
         share = size / (END_DISTANCE_SCALE * node[j, SIZE])
         return share * share * (along * along + binormal * binormal)
     node[j, W_CQ] = along
@@ -119,16 +124,16 @@ def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
 
 @inlined
 def ends_on_surface(k, rise, size, node):
-    """Return whether a straight segment, `size` long, is none because the path ends there on obstacle k's surface.
+    """Return whether the path ends on obstacle k's surface, so that there is no straight segment at that end.
 
-    rise: the component along the surface's normal of the direction from the contact to the end; negative where the end
-    lies below, by no more than the share of the size from which on it counts as inside.
+    size: distance from the contact to the end [m]; rise: component of the unit vector to the end along the surface's
+    normal. It may be negative: an end counts as inside the surface only beyond a certain depth.
     """
     return size <= ON_SURFACE * node[k, SIZE] and size * rise <= LEAST_HEIGHT * node[k, SIZE]
 
 
 @inlined
 def _error_share(along, normal, binormal, size):
-    """Return one end's share |e - t|^2 of ||f||^2 (18); nothing where a short segment's direction is noise."""
+    """Return the share |e - t|^2 of one contact point in ||f||^2 (18); zero where it is within rounding errors."""
     share = (1.0 - along) ** 2 + normal * normal + binormal * binormal
     return share if share * size * size > POINT_ROUNDING * POINT_ROUNDING else 0.0

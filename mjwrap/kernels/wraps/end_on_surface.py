@@ -1,9 +1,9 @@
-"""Polishing of a single wrap by Newton's method, also where an end of the string lies on or little above the surface.
+"""A single wrap solved by Newton's method, also where an end of the string lies on the surface or a little above it.
 
-There the straight segment between end and contact is as short as the tangent from the end, sqrt(2 h / kappa): a
-length that Newton's method oversteps. So a low end is moved onto the surface first and the contact to it, which leaves
-two unknowns, the geodesic's direction and length; then the contact slides on by the tangent. Which directions lead to
-the other end is found by shooting geodesics all round. "Low ends" in docs/derivation.md.
+An end at height h has a straight segment only sqrt(2 h / kappa) long before the contact, shorter than a Newton step. So
+such a low end is first moved onto the surface, with the contact at it. Two unknowns are left, direction and length of
+the geodesic. Then the contact is moved along the geodesic by sqrt(2 h / kappa). The directions that lead to the other
+end are found by shooting geodesics in all directions. "Low ends" in docs/derivation.md.
 """
 
 from __future__ import annotations
@@ -27,18 +27,21 @@ S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
 W_P, W_Q, W_TQ, W_NQ, W_BQ = lay.W_P, lay.W_Q, lay.W_TQ, lay.W_NQ, lay.W_BQ
 FROM_A, TO_B = 0, 1
 
-LOCAL_TOL = 1e-5  # tangency error of a single wrap: all of them are polished together
-LOCAL_STEPS = 15  # of Newton's method
-LOW_END = 0.01  # an end is low where it lies lower above the surface than this, in its size
-NEAR_END = 0.3  # a contact nearer to a low end, in the surface's size, is moved to it
-SHOTS = 36  # geodesics shot from an end
-REFINEMENTS = 4  # of the direction between two of them
-SMALL_MISS = 0.02  # a geodesic that misses the other end by less is polished [rad]
-MAX_MISS = 0.3  # and one that misses it by more after all refinements is none
-MAX_MISS_CHANGE = 2.5  # neighbours that differ by more do not enclose one that hits
-MARCH_STEP = 0.35  # along a geodesic that is shot, in the surface's size
-MAX_MARCH_STEPS = 20
-MAX_SHOT_WAYS = 12
+# Lengths are shares of the surface's size.
+LOCAL_TOL = 1e-5  # tangency error to which a single wrap is solved; later the whole span is solved exactly
+LOCAL_STEPS = 15  # largest number of steps of Newton's method for a single wrap
+LOW_END = 0.01  # an end that lies less high above the surface is a low end
+NEAR_END = 0.3  # a contact nearer to a low end than this is moved to the end
+SHOTS = 36  # number of directions in which geodesics are shot from an end
+REFINEMENTS = 4  # largest number of refinements of a direction between two of them
+SMALL_MISS = 0.02  # a geodesic that misses the other end by a smaller angle needs no further refinement [rad]
+MAX_MISS = (
+    0.3  # a geodesic that misses the other end by a larger angle after all refinements is discarded [rad]
+)
+MAX_MISS_CHANGE = 2.5  # neighbouring misses that differ by more do not enclose a zero [rad]
+MARCH_STEP = 0.35  # step along a geodesic that is shot
+MAX_MARCH_STEPS = 20  # largest number of such steps
+MAX_SHOT_WAYS = 12  # largest number of geodesics that are returned
 
 
 @jit
@@ -49,12 +52,12 @@ def low_end_height(k, node):
 
 @jit
 def polish(k, ends, node, known):
-    """Run Newton's method on obstacle k alone; return whether a string would hold there, and its length [m].
+    """Run Newton's method on obstacle k alone; return (whether the wrap is certified, its length [m]).
 
-    known: what the row holds of its start, NOT_EVALUATED or GEODESICS_EVALUATED.
+    known: `square` of `newton`, NOT_EVALUATED or GEODESICS_EVALUATED.
     """
     error, _, _ = newton(k, k + 1, ends, node, LOCAL_TOL, LOCAL_STEPS, known)
-    # where the row holds this evaluation to the end, a solve that follows need not repeat it
+    # a solve that follows need not repeat this evaluation if the row still holds it
     node[k, lay.W_WRAP_ERROR] = error * error
     if not (error <= LOCAL_TOL and node[k, S_ARC] >= 0.0 and is_local_minimum(k, k + 1, node)):
         return False, 0.0
@@ -63,7 +66,7 @@ def polish(k, ends, node, known):
 
 @jit
 def polish_from_low_ends(k, ends, node, high_a, high_b):
-    """Polish a guess whose ends lie high_a and high_b above the surface; return what `polish` does [m]."""
+    """Solve from a guess, with ends at heights high_a and high_b over the surface [m]; return what `polish` returns."""
     near = NEAR_END * node[k, SIZE]
     if high_a > low_end_height(k, node) and high_b > low_end_height(k, node):
         return polish(k, ends, node, NOT_EVALUATED)
@@ -73,7 +76,7 @@ def polish_from_low_ends(k, ends, node, high_a, high_b):
     to_b = high_b <= low_end_height(k, node) and behind <= near
     if not (from_a or to_b):
         return polish(k, ends, node, NOT_EVALUATED)
-    # the guess, in case Newton's method fails with the ends on the surface
+    # the guess is used again if Newton's method fails with the ends on the surface
     guess = carray(stack(), (80,))
     for i in range(lay.STATE):
         guess[i] = node[k, S_MODE + i]
@@ -93,10 +96,10 @@ def polish_from_low_ends(k, ends, node, high_a, high_b):
 
 @jit
 def polish_shot(k, ends, node, side, high_a, high_b, angle, arc):
-    """Polish a geodesic that `shoot_geodesics` found from side FROM_A or TO_B; return what `polish` does."""
+    """Solve from a geodesic that `shoot_geodesics` found from side FROM_A or TO_B; return what `polish` returns."""
     _, px, py, pz, _, _, _ = end_onto_surface(k, node, ends, 3 if side == FROM_A else 6, True)
     _start_geodesic(k, node, px, py, pz, angle, arc)
-    # shot from B, it is the path backwards: start where it ends, and turn it round
+    # a geodesic shot from B is the path backwards: reverse it
     if side == TO_B:
         _move_start_along(k, node, ends, arc)
         for i in range(3):
@@ -107,9 +110,9 @@ def polish_shot(k, ends, node, side, high_a, high_b, angle, arc):
 
 @jit
 def _polish_on_surface(k, ends, node, from_a, to_b, high_a, high_b):
-    """Polish a guess with its low ends on the surface, then with the ends where they are.
+    """Solve from a guess, first with the low ends moved onto the surface, then with the ends at their own places.
 
-    from_a, to_b: whether A, whether B is such an end.
+    from_a, to_b: whether A and B are such ends. Returns what `polish` returns.
     """
     _, _, _, _, ax, ay, az = end_onto_surface(k, node, ends, 3, from_a)
     _, _, _, _, bx, by, bz = end_onto_surface(k, node, ends, 6, to_b)
@@ -131,7 +134,7 @@ def _polish_on_surface(k, ends, node, from_a, to_b, high_a, high_b):
 
 @jit
 def _move_start_along(k, node, ends, way):
-    """Move the start of obstacle k's geodesic along it by `way` [m]; its end stays."""
+    """Move the start of obstacle k's geodesic along it by `way` [m]; its end point stays."""
     if not way > 0.0:
         return
     arc = node[k, S_ARC]
@@ -166,9 +169,9 @@ def _distance_to_end(k, node, column, ends, end):
 
 @jit
 def end_onto_surface(k, node, ends, column, moves):
-    """Return an end of the string, moved onto the surface where it lies inside, and where `moves` says so.
+    """Return an end of the string, moved onto the surface if it lies inside or if `moves` is true.
 
-    First its height above the surface before [m], then the point in S, then relative to the base.
+    Returns its height above the surface before [m], then the point in S (3), then relative to the base (3).
     """
     x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
     px, py, pz = turn_into_frame(node, k, ends[column] - x, ends[column + 1] - y, ends[column + 2] - z)
@@ -205,7 +208,7 @@ def _start_geodesic(k, node, px, py, pz, angle, arc):
 
 @jit
 def _height_over_tangent_plane(k, node, ends, end):
-    """Return how high the string's end lies over the tangent plane at the present end of obstacle k's geodesic [m]."""
+    """Return the height of the string's end over the tangent plane at the end of obstacle k's geodesic [m]."""
     geodesic(k, node, ends[0], ends[1], ends[2])
     return (
         node[k, W_NQ] * (ends[end] - node[k, W_Q])
@@ -216,10 +219,10 @@ def _height_over_tangent_plane(k, node, ends, end):
 
 @jit
 def _march_into_sight(k, node, px, py, pz, angle, ends, end):
-    """Follow the geodesic that leaves a surface point at an angle, until the string's other end comes into sight.
+    """March along the geodesic that leaves a surface point at an angle until the string's other end is in sight.
 
-    In sight means over the tangent plane. Returns whether it does, the arc length there [m], and the angle between the
-    geodesic's tangent and the direction to that end, seen along the normal [rad].
+    In sight means above the tangent plane. Returns (whether this happens, arc length there [m], angle between the
+    geodesic's tangent and the direction to that end, seen along the normal [rad]).
     """
     _start_geodesic(k, node, px, py, pz, angle, 0.0)
     step = MARCH_STEP * node[k, SIZE]
@@ -239,7 +242,7 @@ def _march_into_sight(k, node, px, py, pz, angle, ends, end):
         node[k, S_ARC] = step
     if high < 0.0:
         return False, 0.0, 0.0
-    # within the last step: regula falsi, the Illinois way
+    # within the last step: the Illinois method (modified regula falsi)
     first, last = 0.0, step
     for _ in range(3):
         middle = (first * high - last * low) / (high - low)
@@ -263,7 +266,7 @@ def _march_into_sight(k, node, px, py, pz, angle, ends, end):
 def shoot_geodesics(k, ends, node, side, ways):
     """Find the geodesics from a low end A (side FROM_A) or B (TO_B) whose tangents lead to the other end.
 
-    Writes angle and arc length of each to `ways` [rad, m], near enough for Newton's method; returns how many.
+    Writes angle and arc length of each to `ways` [rad, m], as starts for Newton's method; returns how many.
     """
     start, end = (3, 6) if side == FROM_A else (6, 3)
     _, px, py, pz, _, _, _ = end_onto_surface(k, node, ends, start, True)
@@ -272,7 +275,7 @@ def shoot_geodesics(k, ends, node, side, ways):
     for i in range(SHOTS + 1):
         angle = i * (2.0 * math.pi / SHOTS)
         in_sight, _, miss = _march_into_sight(k, node, px, py, pz, angle, ends, end)
-        # the miss changes its sign between this direction and the one before: one that hits is enclosed
+        # the miss changes sign between this direction and the one before: a direction without a miss is enclosed
         if (
             in_sight
             and seen
@@ -281,7 +284,7 @@ def shoot_geodesics(k, ends, node, side, ways):
             and count < MAX_SHOT_WAYS
         ):
             first, last, low, high = angle - 2.0 * math.pi / SHOTS, angle, before, miss
-            for _ in range(REFINEMENTS):  # regula falsi, the Illinois way
+            for _ in range(REFINEMENTS):  # the Illinois method (modified regula falsi)
                 middle = first + (last - first) * low / (low - high) if low != high else first
                 in_sight, arc, at = _march_into_sight(k, node, px, py, pz, middle, ends, end)
                 if not in_sight or abs(at) < SMALL_MISS:

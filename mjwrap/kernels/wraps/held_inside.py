@@ -1,15 +1,16 @@
-"""Strings that are held inside a sphere or cylinder: the shortest one that meets the solid (MuJoCo's inside wrap).
+"""Strings that are held inside a sphere or cylinder: the shortest string that meets the solid (MuJoCo's inside wrap).
 
-It is straight where the straight line meets the solid, an end inside it included. Else it has one corner at the point
-P of the surface where the lengths |A - P| and |P - B| sum to least: both segments make the same angle with the normal
-there, on opposite sides. This is a convex problem, so there is one answer at every pose, and it is continuous. P lies
-in the plane of A, B and the sphere's centre; beside a cylinder it is the problem of the cross-section, with z in
-proportion to the length there.
+The string is straight where the straight line meets the solid, also if an end is inside it. Else it has one corner, at
+the point P of the surface where |A - P| + |P - B| is smallest: both segments make the same angle with the normal there,
+on opposite sides. The problem is convex, so that every pose has one solution, which is continuous. P lies in the plane
+of A, B and the sphere's centre; for a cylinder the problem is that of the cross-section, with z in proportion to the
+length there.
 
 In the plane, with lengths in radii and P = (cos phi, sin phi) between the directions of A and B, let a and b be the
-angles of the two segments with the normal. a - b has one root, as its derivative is 1 + (|A|^2 - 1) / 2 |A - P|^2 +
-(|B|^2 - 1) / 2 |B - P|^2 >= 1: Newton's method; on tan a - tan b where they are far apart, as tan b is linear beside a
-point that is close to the surface; with bisection where it would leave the bracket.
+angles of the two segments with the normal. a - b has one root, because its derivative is
+1 + (|A|^2 - 1) / 2 |A - P|^2 + (|B|^2 - 1) / 2 |B - P|^2 >= 1. Newton's method finds it. Where a and b differ much it
+solves tan a - tan b = 0, because tan b is linear near a point that is close to the surface. A step that would leave the
+bracket is replaced by bisection.
 """
 
 from __future__ import annotations
@@ -23,19 +24,17 @@ from mjwrap.kernels.geometry.vectors import rotate
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
 POS, S_P, W_P, W_Q, W_TP, W_TQ = lay.POS, lay.S_P, lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
-LAST_STEP_SQUARE = 1e-28  # last step, squared, in radii and in the lengths of the segments
-LEAST_STEP_SQUARE = 1e-32  # as far as unit vectors can tell
-SMALL_STEP = 1e-3  # step [rad]
-ROUNDING = 4e-16  # of a height over the surface, in radii
-MAX_STEPS = 60  # steps; four are normal, bisection alone takes fifty
-SHORT_SEGMENT = (
-    1e-4  # the angle of a shorter segment is judged as one of this length: rounding turns it [radii]
-)
+LAST_STEP_SQUARE = 1e-28  # square of the last step [rad^2], for segments as long as the radius or longer
+LEAST_STEP_SQUARE = 1e-32  # square of the smallest step that changes a unit vector [rad^2]
+SMALL_STEP = 1e-3  # a step below which unit vectors are normalised by a series [rad]
+ROUNDING = 4e-16  # rounding error of a height over the surface, in radii
+MAX_STEPS = 60  # largest number of steps; four are normal, bisection alone takes fifty
+SHORT_SEGMENT = 1e-4  # a shorter segment's angle has rounding errors and is judged as for this length [radii]
 
 
 @jit
 def _meets_disc(ax, ay, bx, by):
-    """Return whether the straight line from (ax, ay) to (bx, by) meets the unit circle's disc."""
+    """Return whether the straight line from (ax, ay) to (bx, by) meets the unit disc."""
     if ax * ax + ay * ay <= 1.0 or bx * bx + by * by <= 1.0:
         return True
     x, y = bx - ax, by - ay
@@ -47,7 +46,7 @@ def _meets_disc(ax, ay, bx, by):
 def _reflection_point(ax, ay, bx, by):
     """Return P on the unit circle (2), |A - P|, |P - B|, the error of the angles [rad] and the number of steps.
 
-    The line from A to B misses the disc.
+    The line from A to B must not meet the disc.
     """
     distance_a, distance_b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
     # P as an unnormalised direction; (lx, ly) and (hx, hy) are the bracket's two ends, A and B at equal distance
@@ -104,7 +103,7 @@ def _reflection_point(ax, ay, bx, by):
 
 @jit
 def _leave_straight(k, ax, ay, az, bx, by, bz, node):
-    """Leave the string straight; return its length [m]."""
+    """Write that the string is straight; return its length [m]."""
     node[k, lay.S_MODE] = lay.FREE
     for i in range(1, lay.STATE):
         node[k, lay.S_MODE + i] = 0.0
@@ -130,7 +129,7 @@ def _write_corner(k, px, py, pz, length_a, length_b, ends, node):
 
 @jit
 def _write_directions(k, px, py, pz, known_a, known_b, ends, node):
-    """Write the directions of both segments where one has no length: that which it has in the limit."""
+    """Write the directions of both segments where one has no length; its direction is the limit at length zero."""
     nx, ny, nz = normal(k, px, py, pz, node)
     x, y, z = node[k, W_P], node[k, W_P + 1], node[k, W_P + 2]
     ex, ey, ez = x - ends[3], y - ends[4], z - ends[5]

@@ -1,8 +1,8 @@
-"""First guesses for wraps without a closed form, in a half plane that is bounded by the line AB.
+"""Initial guesses for wraps without a closed form, each in a half plane that is bounded by the line AB.
 
-The surface has a section with the half plane, and the shortest way over it is the convex hull over its upper boundary:
-right to the sampling of the boundary, for any surface that has a height. An ellipsoid's section is an ellipse, with
-tangents in closed form. Everything in the frame S of the obstacle. "Wraps without a closed form" in
+The half plane cuts the surface in a section, and the shortest way over the section is the upper convex hull of its
+boundary. Sampling the boundary needs only the height over the surface. The section of an ellipsoid is an ellipse, whose
+tangents have a closed form. Everything in the frame S of the obstacle. "Wraps without a closed form" in
 docs/derivation.md.
 """
 
@@ -22,21 +22,22 @@ from mjwrap.kernels.geometry.vectors import unit
 KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
 S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
 
-COLUMNS = 14  # samples of a section's upper boundary
-BOUNDARY_TOL = 1e-4  # to which a section's boundary is found, in the surface's size
-MAX_HULL_CORRECTIONS = 3  # corrections where the way over a section meets more of it
-HOLLOW_HEIGHT = (
-    0.1  # a string that stands off the surface so high, in its size, between two columns bridges a hollow
+# Lengths are shares of the surface's size.
+COLUMNS = 14  # number of samples of a section's upper boundary
+BOUNDARY_TOL = 1e-4  # accuracy to which a section's boundary is found
+MAX_HULL_CORRECTIONS = (
+    3  # largest number of times that the hull is corrected where it runs through the section
 )
-AT_A = 1e-4  # a section that begins so near to A, in the surface's size, begins at A
-MAX_BOUNDARY_STEPS = 60  # steps to a section's boundary
-GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # of an arc of an ellipse, for a guess
+HOLLOW_HEIGHT = 0.1  # the hull bridges a hollow if it runs higher above the surface between two columns
+AT_A = 1e-4  # a section that begins nearer to A than this begins at A
+MAX_BOUNDARY_STEPS = 60  # largest number of steps outwards to a section's boundary
+GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # quadrature of an ellipse's arc
 
 
 @jit
 def _boundary_height(node, k, x, y, z, wx, wy, wz, start):
-    """Return how far from (x, y, z) along w a column leaves the surface, from a start inside it."""
-    # march outwards by at least the depth, which cannot go too far where the height is a distance
+    """Return the distance from (x, y, z) along w at which a column leaves the surface; start: a distance inside it."""
+    # march outwards by the depth, or by `step` where that is more
     lo = start
     step = 0.05 * node[k, SIZE]
     h = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
@@ -49,7 +50,7 @@ def _boundary_height(node, k, x, y, z, wx, wy, wz, start):
         lo = hi
         step *= 1.2
     low = height(node, k, x + lo * wx, y + lo * wy, z + lo * wz)
-    for _ in range(8):  # regula falsi, the Illinois way
+    for _ in range(8):  # the Illinois method (modified regula falsi)
         if h <= BOUNDARY_TOL * node[k, SIZE]:
             break
         middle = (lo * h - hi * low) / (h - low)
@@ -65,7 +66,7 @@ def _boundary_height(node, k, x, y, z, wx, wy, wz, start):
 
 @jit
 def _upper_hull(count, size, first, step, top, chain):
-    """Write to chain the indices of the columns on the upper convex hull over (0, 0) and (size, 0); return how many."""
+    """Write to chain the indices of the columns on the upper convex hull with (0, 0) and (size, 0); return how many."""
     m = 0
     for i in range(count + 1):
         x, y = first + i * step, 0.0
@@ -75,7 +76,7 @@ def _upper_hull(count, size, first, step, top, chain):
                 continue
         else:
             x = size
-        # Andrew's monotone chain: drop the last corner as long as the string would not bend downwards there
+        # Andrew's monotone chain: remove the last corner while the hull does not bend downwards there
         while m > 0:
             j = int(chain[m - 1])
             jx, jy = first + j * step, top[j]
@@ -94,7 +95,7 @@ def _upper_hull(count, size, first, step, top, chain):
 
 @jit
 def _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
-    """Sample the section at COLUMNS columns and pull a string over it; return the number of the hull's columns."""
+    """Sample the section at COLUMNS columns and find its upper convex hull; return how many columns are on it."""
     for i in range(COLUMNS):
         x = first + i * step
         px, py, pz = ax + x * ux, ay + x * uy, az + x * uz
@@ -102,7 +103,7 @@ def _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first,
         if 0.0 < x < size and height(node, k, px, py, pz) < 0.0:
             top[i] = _boundary_height(node, k, px, py, pz, wx, wy, wz, 0.0)
     m = _upper_hull(COLUMNS, size, first, step, top, chain)
-    # columns that end below the string may have more surface above: take the boundary from the string's height on
+    # above a column that ends below the hull there may be more of the surface: search its boundary from the hull on
     for _ in range(MAX_HULL_CORRECTIONS):
         lifted = False
         j = 0
@@ -130,9 +131,9 @@ def _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first,
 
 @jit
 def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
-    """Do what `guess_in_half_plane` does in closed form.
+    """Write the guess of `guess_in_half_plane` for an ellipsoid, in closed form.
 
-    In the affine image in which the ellipsoid is the unit sphere the section is a circle, and tangents stay tangents.
+    In the affine image in which the ellipsoid is the unit sphere, the section is a circle and tangents are tangents.
     """
     a, b, c = node[k, DIM], node[k, DIM + 1], node[k, DIM + 2]
     px, py, pz = ax / a, ay / b, az / c
@@ -153,7 +154,7 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
     # directions of the normals at P and Q, as angles: tangents from A and B that pass over the circle
     start = math.atan2(-y, -x) - math.atan2(root_a, radius)
     stop = math.atan2(-y, far - x) + math.atan2(root_b, radius)
-    # a small negative arc is a string that is clear of the circle, not one that goes nearly all the way round
+    # a small negative arc means that the string is clear of the circle, not that it goes nearly once round it
     arc = start - stop
     if arc > math.pi * 1.5:
         arc -= 2.0 * math.pi
@@ -178,7 +179,7 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
 
 @jit
 def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
-    """Write a first guess for the string over the section with the half plane towards w; return whether there is one.
+    """Write an initial guess for the string over the section in the half plane towards w; return whether there is one.
 
     u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest.
     """
@@ -186,7 +187,7 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
         return _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size)
     memory = carray(stack(), (80,))
     top, chain = memory[0:COLUMNS], memory[COLUMNS : 2 * COLUMNS]
-    # the columns stand where the surface can be, at first, then closer together over the hull
+    # first the columns cover the whole section, then, closer together, the hull alone
     lo, hi = 0.0, size
     bound = bounding_radius(node, k)
     if bound < math.inf:
@@ -204,7 +205,10 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
             return False
         lo, hi = first + (chain[0] - 1) * step, first + (chain[m - 1] + 1) * step
         deepest = first + chain[0] * step
-    start, stop = 0, m  # the part of the hull that lies on the surface: a string bridges a hollow
+    start, stop = (
+        0,
+        m,
+    )  # the part of the hull up to the first hollow that a string bridges, or behind the last
     for j in range(1, m):
         i, o = int(chain[j]), int(chain[j - 1])
         x, y = first + 0.5 * (i + o) * step, 0.5 * (top[i] + top[o])
@@ -221,7 +225,7 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
         arc += math.hypot((i - o) * step, top[i] - top[o])
     x, y = first + chain[start] * step, top[int(chain[start])]
     p, q = x, y
-    if math.hypot(x, y) < AT_A * node[k, SIZE]:  # A is on the surface: look ahead
+    if math.hypot(x, y) < AT_A * node[k, SIZE]:  # A is on the surface: take the direction of the next piece
         p, q = size, 0.0
         if start + 1 < m:
             p, q = first + chain[start + 1] * step - x, top[int(chain[start + 1])] - y
@@ -263,7 +267,7 @@ def place_contact_on_tube(k, node, x, y, z, tx, ty, tz, angle):
 
 @jit
 def perpendicular(x, y, z):
-    """Return a unit vector at right angles to a unit vector."""
+    """Return a unit vector perpendicular to a unit vector."""
     if abs(x) <= abs(y) and abs(x) <= abs(z):
         x, y, z = 0.0, z, -y
     elif abs(y) <= abs(z):

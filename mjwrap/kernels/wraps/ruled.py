@@ -1,10 +1,10 @@
 """Closed-form wraps of the surfaces with straight rulings: cylinder, elliptic cylinder, cone.
 
-The side on which a string passes them is a matter of topology. It is held by the angle that the string sweeps
-about the axis from A to B, a real number that follows the motion continuously: modulo 2 pi it is known from the pose,
-and the saved value says which multiple is meant. The string touches where the swept angle exceeds what straight
-tangents from A and B leave free. An elliptic cylinder is treated in the affine image in which it is a circular one; a
-string that leaves a cone over its apex is free.
+The side on which a string passes them is topological. It is given by the angle that the string sweeps about the axis
+from A to B, a real number that changes continuously with the motion: the pose gives it modulo 2 pi, and the saved value
+the number of turns. The string touches if the swept angle is larger than the angles of the straight tangents from A and
+B together. An elliptic cylinder is treated in the affine image in which it is circular. A string that slips over the
+apex of a cone is free.
 """
 
 from __future__ import annotations
@@ -21,19 +21,21 @@ from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
 DIM, HINT = lay.DIM, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
 
-INSIDE = 1.0 - 1e-9  # a point closer to the axis than this share of the radius is inside
-LEAST_BEND = 1e-12  # a wrap that would bend the string by less [rad] counts as not touching
+INSIDE = 1.0 - 1e-9  # a point is inside if its distance from the axis is less than this share of the radius
+LEAST_BEND = 1e-12  # a wrap with a smaller arc angle counts as not touching [rad]
 
 A_INSIDE = 1
 B_INSIDE = 2
-SLIPPED = 4  # the string was wound about a cone and would slip over its apex
+SLIPPED = 4  # the string winds about a cone and would slip over its apex
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)  # of an arc of the ellipse, per radian or less
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
+    12
+)  # quadrature of an ellipse's arc, for each radian or less
 
 
 @jit
 def set_free(node, k, sweep):
-    """Leave the surface untouched."""
+    """Write that the string does not touch row k's surface; sweep: its swept angle [rad]."""
     node[k, S_MODE] = lay.FREE
     node[k, S_SWEEP] = sweep
     node[k, S_ARC] = 0.0
@@ -41,7 +43,7 @@ def set_free(node, k, sweep):
 
 @jit
 def _cross_each_other(ax, ay, px, py, bx, by, qx, qy):
-    """Return whether the straight segments from A to P and from B to Q meet, seen along the axis."""
+    """Return whether the straight segments from A to P and from B to Q cross, seen along the axis."""
     ux, uy, vx, vy = px - ax, py - ay, qx - bx, qy - by
     determinant = vx * uy - vy * ux
     if determinant == 0.0:
@@ -56,9 +58,9 @@ def _cross_each_other(ax, ay, px, py, bx, by, qx, qy):
 def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
     """Return the swept angle for a path that passes a cylinder on the hint's side, at a cold start.
 
-    The straight string stands where it is free and its point nearest to the axis lies on that side. Otherwise the way
-    round whose middle lies nearer to the hint is taken, be it the long one, unless it crosses itself: the rule that
-    MuJoCo's side sites follow (`mju_wrap` in engine_util_misc.c).
+    Where the straight string does not enter the cylinder and its point nearest to the axis lies on that side, it stays
+    straight. Otherwise the way round whose middle is nearer to the hint is taken, also if it is the longer one, unless
+    it crosses itself. MuJoCo has the same rule for side sites (`mju_wrap` in engine_util_misc.c).
     """
     size = math.sqrt(hint_x * hint_x + hint_y * hint_y)
     if size < 1e-9 * radius:
@@ -79,7 +81,7 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
     away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     if towards >= away:
         return principal
-    # the contact points of the longer way: it is not taken where its straight segments cross
+    # contact points of the other way, which is not taken if its straight segments cross
     start -= turn * alpha_a
     end += turn * alpha_b
     px, py = radius * math.cos(start), radius * math.sin(start)
@@ -89,13 +91,13 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
 
 @jit
 def _hinted(k, node):
-    """Return whether a hint chooses the side of a surface: at a cold start."""
+    """Return whether a hint chooses the side of row k's surface, which it does at a cold start only."""
     return node[k, S_MODE] == lay.COLD and node[k, HINT] > 0.0
 
 
 @jit
 def _sweep(k, node, ax, ay, bx, by):
-    """Return the angle that the string sweeps about the axis: the saved branch's, or else the shorter one [rad]."""
+    """Return the angle that the string sweeps about the axis, on the saved branch, else the shorter way [rad]."""
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     return sweep if node[k, S_MODE] == lay.COLD else unwrap_angle(sweep, node[k, S_SWEEP])
 
@@ -124,7 +126,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
         sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
-    # the angle that the string lies on: what it sweeps, less what the straight tangents do
+    # angle of the arc: the swept angle minus the angles of the straight tangents
     arc = abs(sweep) - tangents_sweep(root_a, root_b, radius)
     if arc <= LEAST_BEND:
         set_free(node, k, sweep)
@@ -134,7 +136,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     flat = root_a + radius * arc + root_b  # the whole path, seen along the axis
     slope = (bz - az) / flat
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
-    # unrolled, the path is one straight line: the same slope along all of it
+    # on the unrolled cylinder the path is one straight line: its slope is constant
     node[k, S_MODE] = lay.TOUCHED
     node[k, S_SWEEP] = sweep
     node[k, S_P] = radius * nx
@@ -149,7 +151,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
 
 @jit
 def _ellipse_arc(a, b, start, arc):
-    """Return the length of (a cos w, b sin w) from w = start over the angle arc, of either sign: Gauss' rule."""
+    """Return the length of the ellipse (a cos w, b sin w) from w = start over the signed angle arc, by Gauss' rule."""
     pieces = int(math.ceil(abs(arc)))
     half = 0.5 * arc / max(pieces, 1)
     total = 0.0
@@ -164,9 +166,9 @@ def _ellipse_arc(a, b, start, arc):
 
 @jit
 def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
-    """Wrap a string from A to B over an elliptic cylinder about z; the arc's length to about 1e-10."""
+    """Wrap a string from A to B over an elliptic cylinder about z; relative error of the arc length about 1e-10."""
     a, b = node[k, DIM], node[k, DIM + 1]
-    # in the affine image in which the cross-section is the unit circle; tangents stay tangents
+    # in the affine image in which the cross-section is the unit circle, tangents are tangents
     px, py, qx, qy = ax / a, ay / b, bx / a, by / b
     square_a, square_b = px * px + py * py, qx * qx + qy * qy
     limit = INSIDE * INSIDE
@@ -188,7 +190,7 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     mx, my = _contact_normal(qx, qy, 1.0, root_b, -turn)
     out = math.hypot(a * nx - ax, b * ny - ay)
     round_it = _ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
-    # lengths seen along the axis are those of the ellipse itself again
+    # lengths seen along the axis are not those of the affine image
     flat = out + round_it + math.hypot(a * mx - bx, b * my - by)
     slope = (bz - az) / flat
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
@@ -208,10 +210,9 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
 
 @jit
 def _tangent_ruling(rho, radius):
-    """Return the angle between A and the rulings that its tangent planes touch, and its distance from them."""
-    if rho <= abs(
-        radius
-    ):  # inside, or inside the mirrored cone beyond the apex, where no tangent plane exists
+    """Return the angle between A and the rulings at which its tangent planes touch, and its distance from them."""
+    # inside the cone, or inside its mirror image beyond the apex, there is no tangent plane
+    if rho <= abs(radius):
         return (0.0 if radius > 0.0 else math.pi), 0.0
     root = math.sqrt((rho - radius) * (rho + radius))
     return math.atan2(root, radius), root
@@ -221,8 +222,8 @@ def _tangent_ruling(rho, radius):
 def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     """Wrap a string from A to B over a cone about z.
 
-    The tangent planes through A and B unfold with the cone: the path is the straight line between A and B in the
-    development, if that leaves the apex on its far side. Otherwise the string is free beyond the apex, or slips.
+    The tangent planes through A and B unroll with the cone. In this development the path is the straight line between A
+    and B, if it passes the apex on the right side. Otherwise the string is free beyond the apex, or it slips.
     """
     slope = node[k, DIM + 1]
     cosine, sine = cone_angle(slope)
@@ -247,7 +248,7 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
         if node[k, S_MODE] != lay.COLD and abs(node[k, S_SWEEP]) > math.pi:
             set_free(node, k, sweep)
             return inside | SLIPPED
-        sweep = principal  # a free string that passes beyond the apex, or a hint that asks for what cannot be
+        sweep = principal  # a free string that passes beyond the apex, or a hint that cannot be followed
         arc = abs(sweep) - alpha_a - alpha_b
     total = delta_a + arc * sine + delta_b
     if arc <= LEAST_BEND or total >= math.pi:

@@ -1,11 +1,11 @@
-"""Wraps without a closed form: a search among guesses in half planes through A and B, polished by Newton's method.
+"""Wraps without a closed form: initial guesses in half planes through AB, solved by Newton's method.
 
-A taut string between A and B that touches a surface runs near a plane through A and B. Half planes all round AB give
-guesses for every side (`initial_guess.py`); Newton's method makes paths of them, and the certificate discards those on
-which no string would hold. "Wraps without a closed form" in docs/derivation.md.
+A taut string between A and B that touches a surface runs near a plane through A and B. Half planes in all
+directions around AB give guesses for every side (`initial_guess.py`). Newton's method solves from each, and the
+certificate discards those at which a string would slip off. "Wraps without a closed form" in docs/derivation.md.
 
-Around a torus the side is topological, as around a cylinder: the angle that the string sweeps about the middle of the
-tube. Bounded convex surfaces have no such number: there the path keeps to the minimum that it is on.
+On a torus the side is topological, as on a cylinder: it is given by the winding angle about the middle of the tube. On
+a bounded convex surface there is no such number: the path stays at the local minimum at which it is.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
-DIRECTIONS = 12  # half planes around AB
+DIRECTIONS = 12  # number of half planes around AB
 CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
-SAME_BRANCH = 1.0  # difference of swept angles [rad] that is no whole turn
+SAME_BRANCH = 1.0  # winding angles that differ by less belong to the same branch [rad]
 
 
 @jit
 def _on_branch(k, node, known, before):
-    """Return whether the path of the last evaluation goes round the tube as it did before."""
+    """Return whether the path of the last evaluation is on the branch of the winding angle `before`."""
     if not known:
         return True
     angle = winding_angle(k, node)
@@ -56,9 +56,9 @@ def _on_branch(k, node, known, before):
 
 @jit
 def _leave_free(k, node, sweep, low, ax, ay, az, bx, by, bz):
-    """Leave the surface untouched by the straight segment from A to B, and save where that runs, in S.
+    """Write that the string does not touch the surface, and save the straight segment from A to B, in S.
 
-    A large move needs it, to tell on which side of the surface the string was (`span_solver.py`).
+    After a large move this tells on which side of the surface the string was (`span_solver.py`).
     """
     set_free(node, k, sweep)
     node[k, lay.W_CLEARANCE] = low
@@ -72,15 +72,16 @@ def _leave_free(k, node, sweep, low, ax, ay, az, bx, by, bz):
 
 @jit
 def wrap_by_search(k, ends, node, search):
-    """Wrap the string from A to B over obstacle k; `ends` as for `solve_span`. Returns A_INSIDE and B_INSIDE summed.
+    """Wrap the string from A to B over obstacle k; return the sum of A_INSIDE and B_INSIDE, as they apply.
 
-    Without `search` a contact that Newton's method does not find again stays where it was.
+    ends as for `solve_span`. Without `search` a contact that Newton's method does not find again stays where it was.
     """
     high_a, ax, ay, az, qx, qy, qz = end_onto_surface(k, node, ends, 3, False)
     high_b, bx, by, bz, rx, ry, rz = end_onto_surface(k, node, ends, 6, False)
     low = (INSIDE - 1.0) * node[k, SIZE]
     inside = (A_INSIDE if high_a < low else 0) + (B_INSIDE if high_b < low else 0)
-    if node[k, lay.TOUCH] != 0.0:  # the string comes from the surface itself
+    # the string comes from another contact with the same surface, or goes to one: that end is not a low end
+    if node[k, lay.TOUCH] != 0.0:
         high_a = math.inf
     elif k + 1 < node.shape[0] and node[k + 1, lay.TOUCH] != 0.0 and node[k + 1, S_MODE] == TOUCHED:
         high_b = math.inf
@@ -102,11 +103,11 @@ def wrap_by_search(k, ends, node, search):
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     low, share = segment_clearance(node, k, ax, ay, az, bx, by, bz)
     straight = segment_winding_angle(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
-    # hooked: clear of the surface in this pose, but wound about the tube by another number of turns
+    # hooked: the straight segment is clear of the surface, but on another branch than the string
     hooked = branch and abs(straight - unwrap_angle(straight, before)) > SAME_BRANCH
     hinted = mode == COLD and node[k, HINT] > 0.0
     if low >= -CLEAR_DEPTH * node[k, SIZE] and not hooked:
-        # a hinted side may hold a string that the straight one does not show
+        # on the side of the hint there may be a wrap although the straight segment is clear
         if hinted and hollow(k, node):
             place_contact(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
             good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
@@ -133,8 +134,8 @@ def wrap_by_search(k, ends, node, search):
 def _search(
     k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, branch, before, clear, high_a, high_b
 ):
-    """Try half planes all round AB, the likeliest first; leave the best path, or the first guess where none holds."""
-    # u along AB; w at right angles to it, from AB's lowest point towards the hint or along the normal; v = u x w
+    """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found."""
+    # u along AB; w perpendicular to it, from AB's lowest point towards the hint or along the normal; v = u x w
     ux, uy, uz = dx / size, dy / size, dz / size
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
     if hinted:
@@ -159,9 +160,8 @@ def _search(
         # to both sides in turn: 0, 1, -1, 2, -2, ... twelfths of a turn
         turn = (j + 1) // 2 * (2.0 * math.pi / DIRECTIONS)
         c, s = math.cos(turn), math.sin(turn) if j % 2 == 1 else -math.sin(turn)
-        if (
-            clear
-        ):  # the string is hooked: no half plane's section blocks it, but it is round the tube somewhere near
+        # hooked: AB is clear, so that no section lies in its way; guesses all round the tube instead
+        if clear:
             place_contact_on_tube(k, node, fx, fy, fz, dx, dy, dz, j * (2.0 * math.pi / DIRECTIONS))
         elif not guess_in_half_plane(
             k,
@@ -190,10 +190,10 @@ def _search(
         node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
         for i in range(lay.STATE):
             memory[i] = node[k, S_MODE + i]
-        # the nearest to the hint, or to the side that was lost, will do; else the shortest of all
+        # the first is nearest to the hint, or to the side that was lost; without either take the shortest
         if hinted or not cold:
             break
-    # from low ends, all geodesics that lead to the other end
+    # from low ends: all geodesics whose tangents lead to the other end
     if not found or (cold and not hinted):
         ways = carray(stack(), (80,))
         for side in range(2):
@@ -214,7 +214,7 @@ def _search(
                     memory[c] = node[k, S_MODE + c]
             j += 1
     node[k, S_MODE] = TOUCHED
-    # the row still holds the evaluation of the best one where that was the last one tried
+    # if the best one was the last that was tried, the row still holds its evaluation
     if found and fresh == j:
         return
     node[k, lay.W_WRAP_ERROR] = -1.0

@@ -1,9 +1,10 @@
 """The wrap of one obstacle between two given points, for cold starts and touchdown.
 
-Closed forms where there are any (`ruled.py`, and the sphere here: its shorter way is the only stable one), a search
-with Newton's method elsewhere (`search.py`). Every function takes the points A (before) and B (after) and writes the
-obstacle's row of `node`, FREE where the straight segment from A to B is clear of the surface. It returns 0, plus
-A_INSIDE, plus B_INSIDE where the point lies inside the surface (it is then taken as on it), plus SLIPPED.
+In closed form for ruled surfaces (`ruled.py`) and for the sphere (here: the shorter way is the only stable one), else
+by a search with Newton's method (`search.py`). Every function takes the points A before and B behind the obstacle and
+writes the obstacle's row of `node`: FREE where the straight segment from A to B does not enter the surface. It returns
+the sum of A_INSIDE and B_INSIDE, where A or B lies inside the surface and is treated as lying on it, and SLIPPED; else
+0.
 """
 
 from __future__ import annotations
@@ -39,9 +40,10 @@ S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, la
 
 @jit
 def _plane_normal(ax, ay, az, bx, by, bz, k, node):
-    """Return the unit normal of the plane in which the string passes a sphere's centre.
+    """Return the unit normal of the plane through A, B and a sphere's centre, in which the string lies.
 
-    Where A, centre and B are in line every plane is as good: the hint's is taken, else the last one, else any.
+    Where A, centre and B are in line the plane is not unique: the one through the hint is taken, else the last one,
+    else any.
     """
     wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     size = math.sqrt(wx * wx + wy * wy + wz * wz)
@@ -75,7 +77,7 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
     root_a = math.sqrt(max(square_a - square, 0.0))
     root_b = math.sqrt(max(square_b - square, 0.0))
-    # the angle between A and B, less what the straight tangents from both sweep, is what the string lies on
+    # angle of the arc: the angle between A and B, minus the angles of the straight tangents
     wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     sweep = math.atan2(math.sqrt(wx * wx + wy * wy + wz * wz), ax * bx + ay * by + az * bz)
     arc = sweep - tangents_sweep(root_a, root_b, radius)
@@ -83,7 +85,7 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
         set_free(node, k, sweep)
         return inside
     wx, wy, wz = _plane_normal(ax, ay, az, bx, by, bz, k, node)
-    # u towards A, v at right angles to it in the string's plane, on the way to B
+    # u points to A, v is perpendicular to u in the string's plane, towards B
     rho = max(math.sqrt(square_a), 1e-300)
     ux, uy, uz = ax / rho, ay / rho, az / rho
     vx, vy, vz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
@@ -107,8 +109,8 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
 def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
     """Wrap the string from A to B (in world directions, relative to the base point) over obstacle k [m].
 
-    Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns A_INSIDE, B_INSIDE and SLIPPED
-    summed, or 0. search: look for another side where a contact is lost, on surfaces without a closed form.
+    Writes the saved solution, FREE or TOUCHED, and evaluates its geodesic. Returns the sum of A_INSIDE, B_INSIDE and
+    SLIPPED, as they apply. search: on surfaces without a closed form, search for another wrap where a contact is lost.
     """
     if not closed_form(k, node):
         return wrap_by_search(k, (base_x, base_y, base_z, ax, ay, az, bx, by, bz), node, search)
@@ -124,7 +126,7 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
         inside = wrap_cone(k, px, py, pz, qx, qy, qz, node)
     elif kind == lay.ELLIPTIC_CYLINDER:
         inside = wrap_elliptic_cylinder(k, px, py, pz, qx, qy, qz, node)
-    else:  # a row whose trait has no wrap to it
+    else:  # the row has the trait CLOSED_FORM, but its kind has no closed form
         inside = SLIPPED
         set_free(node, k, 0.0)
     if node[k, S_MODE] == lay.TOUCHED:
@@ -134,6 +136,6 @@ def wrap(k, node, base_x, base_y, base_z, ax, ay, az, bx, by, bz, search):
 
 @jit
 def contains(k, node, x, y, z):
-    """Return whether obstacle k contains the point (x, y, z) of the world: it lies inside its surface."""
+    """Return whether the point (x, y, z) of the world lies inside obstacle k."""
     x, y, z = into_frame(node, k, x, y, z)
     return height(node, k, x, y, z) < (INSIDE - 1.0) * node[k, SIZE]
