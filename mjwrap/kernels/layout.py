@@ -111,9 +111,7 @@ W_Y = 83  # block elimination: solution for the right-hand side, at last the New
 W_X = 87  # block elimination: solution for the block above the diagonal (4 x 2)
 W_SAVE = 95  # P, t, s before a trial step (7)
 W_OLD = 102  # the saved solution from which the solve started (11)
-W_KMIN = (
-    113  # negative if the normal curvature is negative somewhere on the way: a string lifts off there [1/m]
-)
+W_KMIN = 113  # negative if the normal curvature is negative on the way, where a string lifts off [1/m]
 W_RMIN = 114  # smallest ratio of the field r to the arc length on the way; <= 0 behind a conjugate point
 W_ANGLE = 115  # angle about the axis from P to Q [rad]; torus: how many times the geodesic passes the hole
 TOUCH = 116  # number of the row among the rows of its surface, from 0
@@ -124,13 +122,9 @@ W_START = 140  # the saved solution from which a solve over a large move started
 W_CLEARANCE = 151  # height of the lowest point of a free string over the surface [m]
 W_START_ERROR = 152  # in a span's first row: ||f||^2 of the contacts from which it started; -1: not evaluated
 W_RESTARTS = 153  # in a span's first row: number of restarts and continuations of the last solve
-W_END_ON_SURFACE = (
-    154  # 1 where the path ends on the surface, at Q: rows 2 and 3 of h then hold Q - B; 0 else
-)
-W_END_TARGET = 155  # 1 while Newton's method moves Q to an end on the surface from any distance; 0 else
-INSIDE = (
-    156  # ABOUT_POINT or ABOUT_AXIS where a string between two fixed points is held inside the solid; 0 else
-)
+W_END_ON_SURFACE = 154  # 1 if the path ends on the surface, at Q: rows 2 and 3 of h then hold Q - B
+W_END_TARGET = 155  # 1 while Newton's method moves Q to an end on the surface from any distance
+INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS if a string between two fixed points is held inside the solid
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
 ROW = 160  # 20 cache lines

@@ -135,9 +135,8 @@ def _module_of(folder: str) -> str | None:
 def _last_use(folder: Path) -> float:
     """Return when a version was last used or added to."""
     dates = [folder.stat().st_mtime]
-    if not _module_of(
-        folder.name
-    ):  # older mjwraps wrote to folders in it, which leaves its own date unchanged
+    # older mjwraps wrote to folders in it, which leaves its own date unchanged
+    if not _module_of(folder.name):
         dates += [below.stat().st_mtime for below in folder.iterdir()]
     return max(dates)
 

@@ -19,9 +19,8 @@ def objection(folder: Path) -> str | None:
 
     Raises `OSError` where its path leads through a file, or cannot be read.
     """
-    if (
-        os.name == "nt"
-    ):  # there the folders of a profile belong to its user; owners and groups have no numbers
+    # there the folders of a profile belong to its user; owners and groups have no numbers
+    if os.name == "nt":
         return None
     ways = _ways(folder)
     if ways is None:

@@ -18,9 +18,9 @@ from typing import NamedTuple
 PACKAGE = "mjwrap"
 _ROOT = Path(__file__).parents[2]
 _ROOM = "mjwrap.kernels.compilation."
-_HOW = (f"{_ROOM}jit", f"{_ROOM}linking")  # decide how every kernel is compiled
+_ALWAYS_COUNTED = (f"{_ROOM}jit", f"{_ROOM}linking")  # decide how every kernel is compiled
 # These decide only where machine code is kept, or something that is part of every key (`circumstances`) anyway.
-_WHERE = {
+_NEVER_COUNTED = {
     f"{_ROOM}{name}"
     for name in (
         "cache_folders",
@@ -34,10 +34,9 @@ _WHERE = {
 }
 _STARTED = time.time()
 
-_BEFORE = re.compile(
-    r"(?:^|[;:])[ \t\f]*(?:from\b[ \t]*([.\w \t]+?)[ \t]*)?$"
-)  # what stands before the word `import` in its line
-_AFTER = re.compile(r"(?!\w)[ \t]*(\((?:[^)#]|#[^\n]*)*\)|[^\n;#]*)")
+# what stands before the word `import` in its line
+_BEFORE_IMPORT = re.compile(r"(?:^|[;:])[ \t\f]*(?:from\b[ \t]*([.\w \t]+?)[ \t]*)?$")
+_AFTER_IMPORT = re.compile(r"(?!\w)[ \t]*(\((?:[^)#]|#[^\n]*)*\)|[^\n;#]*)")
 
 
 class Source(NamedTuple):
@@ -69,10 +68,10 @@ def reached(module: str) -> dict[str, Source]:
     is only a list of names.
     """
     found: dict[str, Source] = {}
-    todo = [module, *_HOW]
+    todo = [module, *_ALWAYS_COUNTED]
     while todo:
         name = todo.pop()
-        if name not in found and name not in _WHERE and (source := read(name)):
+        if name not in found and name not in _NEVER_COUNTED and (source := read(name)):
             found[name] = source
             todo += source.imports
     for name in list(found):
@@ -125,8 +124,8 @@ def _imports(text: str, package: str) -> Iterator[str]:
     """Yield the names of the modules of mjwrap that a text imports; package: the one to which the text belongs."""
     at = text.find("import")
     while at >= 0:
-        before = _BEFORE.search(text[text.rfind("\n", 0, at) + 1 : at])
-        after = _AFTER.match(text, at + len("import"))
+        before = _BEFORE_IMPORT.search(text[text.rfind("\n", 0, at) + 1 : at])
+        after = _AFTER_IMPORT.match(text, at + len("import"))
         if before and after:
             yield from _imported(before.group(1), after.group(1), package)
         at = text.find("import", at + len("import"))
@@ -137,11 +136,11 @@ def _imported(origin: str | None, listed: str, package: str) -> Iterator[str]:
     if origin is None and PACKAGE in listed:
         for name, renamed in _names(listed):
             if name.split(".")[0] == PACKAGE:
-                yield from _bound(name if renamed else PACKAGE)
+                yield from _reached_by_name(name if renamed else PACKAGE)
     elif origin:
         origin = _absolute("".join(origin.split()), package)
         if origin.split(".")[0] == PACKAGE:
-            yield from _taken(origin, [name for name, _ in _names(listed)])
+            yield from _reached_by_from(origin, [name for name, _ in _names(listed)])
 
 
 def _names(text: str) -> Iterator[tuple[str, bool]]:
@@ -164,7 +163,7 @@ def _absolute(origin: str, package: str) -> str:
     return ".".join([*above, name] if name else above)
 
 
-def _taken(origin: str, names: list[str]) -> Iterator[str]:
+def _reached_by_from(origin: str, names: list[str]) -> Iterator[str]:
     """Yield what `from origin import names` reaches."""
     path = _file(origin)
     if path is None or not path.endswith("__init__.py"):
@@ -172,14 +171,14 @@ def _taken(origin: str, names: list[str]) -> Iterator[str]:
         return
     for name in names:
         if name == "*":
-            yield from _bound(origin)
+            yield from _reached_by_name(origin)
         elif _file(f"{origin}.{name}"):
-            yield from _bound(f"{origin}.{name}")
+            yield from _reached_by_name(f"{origin}.{name}")
         else:
             yield origin
 
 
-def _bound(module: str) -> Iterator[str]:
+def _reached_by_name(module: str) -> Iterator[str]:
     """Yield what can be reached by a module's name: for a package, everything in it."""
     path = _file(module)
     yield module

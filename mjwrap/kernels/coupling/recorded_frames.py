@@ -15,11 +15,8 @@ from mjwrap.kernels.coupling.moments import length_jacobian
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
-F_AT, F_FORCE, F_TIP = (
-    0,
-    3,
-    6,
-)  # columns of a force: a point [m], the force [N], 1 if the arrow ends at the point
+# columns of a force: a point (3) [m], the force (3) [N], 1 if its arrow ends at the point
+F_AT, F_FORCE, F_TIP = 0, 3, 6
 FORCE = 7
 
 

@@ -37,9 +37,8 @@ WEIGHT = _weights(_N)
 RATE_WEIGHT = WEIGHT * _N  # weights of the last differences, which are h y' / n
 ERROR_WEIGHT = WEIGHT - np.append(_weights(_N[:-1]), 0.0)  # weights of the error estimate
 
-TOLERANCE = (
-    1e-11  # largest error estimate; the error of a step is then below 1e-12, mostly 1e-14 (docs/accuracy.md)
-)
+# largest error estimate; the error of a step is then below 1e-12, mostly 1e-14 (docs/accuracy.md)
+TOLERANCE = 1e-11
 SHRINK_EXPONENT = 1.0 / 15.0  # power of TOLERANCE over the estimate by which a rejected step is shortened
 MAX_STEPS = 200  # most steps of one geodesic, with the rejected ones
 

@@ -125,9 +125,8 @@ def balance(law, activation, damping, height, ratio, unit_length, before, rate, 
     last_step = LAST_STEP if close <= NEAR_BALANCE else close
     low_known = high_known = False
     along = max(unit_length - 1.0, 0.0) / ratio
-    slack = math.sqrt(
-        along * along + height * height
-    )  # fibre length at which the tendon has its slack length
+    # fibre length at which the tendon has its slack length
+    slack = math.sqrt(along * along + height * height)
     along = max(unit_length - LONGEST_START, 0.0) / ratio
     shortest_start = min(max(math.sqrt(along * along + height * height), low), high)
     x = max(x, shortest_start)

@@ -31,12 +31,10 @@ F_MAX, OPTIMAL, SLACK, PENNATION, V_MAX, DAMPING, ELASTIC, HEIGHT, LEAST = range
 
 # [v_max] largest last Newton step of `fiber_rate` for a velocity; the error that is left is its square
 LAST_VELOCITY_STEP = 1e-8
-ROOT_SPACING = (
-    0.02  # [l_o] distance of the fibre lengths at which `equilibrium` looks for the first change of sign
-)
-SINGLE_ROOT = (
-    2.0  # [l_o] fibre length from which only the passive force grows: at most one equilibrium is left
-)
+# [l_o] distance of the fibre lengths at which `equilibrium` looks for the first change of sign
+ROOT_SPACING = 0.02
+# [l_o] fibre length from which only the passive force grows: at most one equilibrium is left
+SINGLE_ROOT = 2.0
 
 
 # ------------------------------------------------------------------------------------- forces, SI units

@@ -144,7 +144,7 @@ def balancing_velocity(strength, damping, wanted, close):
 
 @jit
 def tendon(x):
-    """Tendon force-length curve: zero up to the slack length, one at 4.9 % strain, linear above a force of two thirds."""
+    """Tendon force-length curve: zero up to the slack length, one at 4.9 % strain, linear above two thirds."""
     return bezier.evaluate(_TENDON_PIECES, _TENDON_CELLS, x)
 
 

@@ -24,9 +24,8 @@ CONSTANTS = 8
 SLOW_HEAT = 25.0  # W/kg, activation and maintenance of slow-twitch fibres; 128 more for fast-twitch ones
 FAST_HEAT = 128.0
 ACTIVATION_SHARE = 0.4  # share of activation in this heat; it does not depend on the overlap of filaments
-SLOW_SHORTENING = (
-    100.0 * 2.5
-)  # W/kg at 1 v_max; slow-twitch fibres are 2.5 times slower than fast-twitch ones
+# W/kg at 1 v_max; slow-twitch fibres are 2.5 times slower than fast-twitch ones
+SLOW_SHORTENING = 100.0 * 2.5
 SLOW_LIMIT = 100.0  # W/kg, limit of the slow-twitch shortening heat
 FAST_SHORTENING = 153.0
 LENGTHENING_2003 = 4.0  # times the slow-twitch coefficient of shortening

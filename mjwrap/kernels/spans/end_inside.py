@@ -36,9 +36,8 @@ from mjwrap.kernels.wraps.single import contains
 
 KIND, POS, ROT, S_MODE = lay.KIND, lay.POS, lay.ROT, lay.S_MODE
 NO_SUBSTITUTE = 1e300  # the tangency error where there is no substitute path
-LEAST_EIGENVALUE = (
-    0.5  # smallest eigenvalue of I + h W: bounds the depth of an end whose string wraps the surface
-)
+# smallest eigenvalue of I + h W: bounds the depth of an end whose string wraps the surface
+LEAST_EIGENVALUE = 0.5
 
 
 @jit

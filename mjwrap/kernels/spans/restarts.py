@@ -18,9 +18,8 @@ from mjwrap.kernels.tangency.certify import shift_off_saddle
 HINT, S_MODE, W_OLD, W_Q, W_Y = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_Q, lay.W_Y
 
 MAX_RESTARTS = 4
-RESTART_PASSES = (
-    7  # passes over the obstacles in the first restart; each further one takes about twice as many
-)
+# passes over the obstacles in the first restart; each further one takes about twice as many
+RESTART_PASSES = 7
 COLD_RESTART = 2  # number of the restart that forgets all contacts, counted from 0
 SADDLE_SHIFT = 0.3  # how far a path is moved off a saddle, in the surface's size
 

@@ -33,9 +33,8 @@ S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_Q, W_OLD = lay.W_Q, lay.W_OLD
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
-LEAST_FLIPPED_SWEEP = (
-    0.5 * math.pi
-)  # a winding angle below which a string is on the shorter side already [rad]
+# a winding angle below which a string is on the shorter side already [rad]
+LEAST_FLIPPED_SWEEP = 0.5 * math.pi
 MAX_FLIPS = 3  # largest number of neighbours that change sides together
 FLIP_NEIGHBOURS = 4  # obstacles on each side of them that are wrapped again, too
 MAX_SWEEPS = 4  # largest number of sweeps of side changes over the whole row

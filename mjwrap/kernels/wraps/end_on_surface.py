@@ -35,9 +35,8 @@ NEAR_END = 0.3  # a contact nearer to a low end than this is moved to the end
 SHOTS = 36  # number of directions in which geodesics are shot from an end
 REFINEMENTS = 4  # largest number of refinements of a direction between two of them
 SMALL_MISS = 0.02  # a geodesic that misses the other end by a smaller angle needs no further refinement [rad]
-MAX_MISS = (
-    0.3  # a geodesic that misses the other end by a larger angle after all refinements is discarded [rad]
-)
+# a geodesic that misses the other end by a larger angle after all refinements is discarded [rad]
+MAX_MISS = 0.3
 MAX_MISS_CHANGE = 2.5  # neighbouring misses that differ by more do not enclose a zero [rad]
 MARCH_STEP = 0.35  # step along a geodesic that is shot
 MAX_MARCH_STEPS = 20  # largest number of such steps

@@ -25,9 +25,8 @@ S_MODE, S_P, S_T, S_ARC = lay.S_MODE, lay.S_P, lay.S_T, lay.S_ARC
 # Lengths are shares of the surface's size.
 COLUMNS = 14  # number of samples of a section's upper boundary
 BOUNDARY_TOL = 1e-4  # accuracy to which a section's boundary is found
-MAX_HULL_CORRECTIONS = (
-    3  # largest number of times that the hull is corrected where it runs through the section
-)
+# largest number of times that the hull is corrected where it runs through the section
+MAX_HULL_CORRECTIONS = 3
 HOLLOW_HEIGHT = 0.1  # the hull bridges a hollow if it runs higher above the surface between two columns
 AT_A = 1e-4  # a section that begins nearer to A than this begins at A
 MAX_BOUNDARY_STEPS = 60  # largest number of steps outwards to a section's boundary
@@ -205,10 +204,8 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
             return False
         lo, hi = first + (chain[0] - 1) * step, first + (chain[m - 1] + 1) * step
         deepest = first + chain[0] * step
-    start, stop = (
-        0,
-        m,
-    )  # the part of the hull up to the first hollow that a string bridges, or behind the last
+    # the part of the hull up to the first hollow that a string bridges; for a second contact, behind the last one
+    start, stop = 0, m
     for j in range(1, m):
         i, o = int(chain[j]), int(chain[j - 1])
         x, y = first + 0.5 * (i + o) * step, 0.5 * (top[i] + top[o])

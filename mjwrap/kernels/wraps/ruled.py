@@ -28,9 +28,8 @@ A_INSIDE = 1
 B_INSIDE = 2
 SLIPPED = 4  # the string winds about a cone and would slip over its apex
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
-    12
-)  # quadrature of an ellipse's arc, for each radian or less
+# quadrature of an ellipse's arc, for each radian or less
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @jit
