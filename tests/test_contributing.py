@@ -1,6 +1,7 @@
 """CONTRIBUTING.md names every room of the package and of the benchmarks, and files that exist."""
 
 import re
+import tomllib
 from pathlib import Path
 
 from doc_commands import FENCE, ROOT
@@ -38,6 +39,16 @@ def test_every_room_has_a_line_and_no_line_is_left_over() -> None:
 
 def test_every_line_says_what_the_room_holds() -> None:
     assert [room for room, says in rooms_named().items() if len(says) < 10] == []
+
+
+def test_the_order_of_imports_is_that_of_the_contracts() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    layers = {each["name"]: each.get("layers") for each in project["tool"]["importlinter"]["contracts"]}
+    blocks = [x["body"].splitlines() for x in FENCE.finditer(TEXT) if x["language"] == "text"]
+    assert layers["Rooms"] in [[line.strip() for line in block] for block in blocks]
+    told = re.search(r"Inside `kernels/` the order is (.*?)\. Contracts", TEXT, re.DOTALL)
+    assert told is not None
+    assert re.findall(r"`(.*?)`", told[1]) == layers["Rooms of the kernels"]
 
 
 def test_files_that_are_named_exist() -> None:
