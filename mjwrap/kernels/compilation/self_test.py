@@ -18,7 +18,7 @@ import numba
 
 from mjwrap.kernels.compilation import cache_folders
 
-TESTED = ("0.65", "0.66", "0.67", "0.68")  # by `benchmarks/numba_versions.py`
+TESTED = ("0.65", "0.66", "0.67", "0.68")  # releases tested with `benchmarks/numba_versions.py`
 _PASSED, _FAILED, _BEGUN = "passed", "failed", "begun"
 _PATIENCE = 60.0  # [s] a test that began longer ago and left no result has crashed
 _NOTICE = (

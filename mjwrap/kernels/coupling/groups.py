@@ -60,7 +60,7 @@ class Transmissions(NamedTuple):
     gear: FloatRows  # (outputs, 6)
     actuator_length: Floats
     actuator_velocity: Floats
-    rownnz: Indices  # of the sparse moment, whose columns contain every dof that changes the path
+    rownnz: Indices  # rows of the sparse moment; their columns contain every dof that changes the path
     rowadr: Indices
     colind: Indices
     moment: Floats

@@ -28,7 +28,7 @@ class Inputs(NamedTuple):
     act: Floats  # mjData's
     ctrl: Floats  # mjData's
     own: FloatRows  # (n, 2) activation and fibre length [m] of muscles without an actuator
-    excitation: Floats  # of muscles without an actuator
+    excitation: Floats  # excitations of muscles without an actuator
 
 
 class Timing(NamedTuple):
