@@ -207,7 +207,7 @@ def equilibrium(law, params, m, activation, length):
 
 @jit
 def _lowest(law, activation, height, ratio, unit_length, low, high):
-    """Return the fibre length in [low, high] at which the imbalance is least or, once it is found, at most zero.
+    """Return a fibre length in [low, high] at which the imbalance is at most zero, or else the one where it is least.
 
     Returns (fibre length [l_o], imbalance [F_max], evaluations).
     """
