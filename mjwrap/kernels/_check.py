@@ -1,7 +1,7 @@
 """Whether numba is one on which `_kernel.py` can build; where it is not, kernels are plain numba functions.
 
 What `_kernel.py` builds on is no public part of numba. Versions that the tests ran with are taken as they are; any
-other has to compile, keep and load three small functions once, which takes a second. The verdict is kept on the disk.
+other has to compile, keep and load four small functions once, which takes a second. The verdict is kept on the disk.
 """
 
 from __future__ import annotations

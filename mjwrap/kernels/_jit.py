@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba.core import event
+from numba.core import event, types
 
 from mjwrap.kernels import _check, _places
 from mjwrap.kernels._folders import config
@@ -44,7 +44,7 @@ class _Announcer(event.Listener):
 event.register("numba:compile", _Announcer())
 
 
-def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
+def jit(function: F, kind: str = "Kernel", *further: Any, **options: bool) -> F:
     """Compile a kernel: no GIL, IEEE semantics but for fused multiply-adds, machine code kept on disk.
 
     One whose name begins with an underscore cannot be called from Python, which makes it cheaper to compile.
@@ -59,7 +59,7 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
 
     if function.__name__.startswith("_"):
         kind, options = "Hidden", options | {"no_cpython_wrapper": True}
-    kernel: Any = getattr(_kernel, kind)(function, _kernel.OPTIONS | options)
+    kernel: Any = getattr(_kernel, kind)(function, _kernel.OPTIONS | options, *further)
     with _places.kept(function):
         kernel.enable_caching()
     return kernel
@@ -68,6 +68,15 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
 def apart(function: F) -> F:
     """Compile a kernel whose code callers do not take over: a large one, to which a call is nothing."""
     return jit(function, "Apart")
+
+
+def deferred(*returns: Any) -> Callable[[F], F]:
+    """Compile a kernel at its first call: a large one, which many scenes never call.
+
+    returns: numba's types of what it returns.
+    """
+    kind = returns[0] if len(returns) == 1 else types.Tuple(returns)
+    return lambda function: jit(function, "Deferred", kind)
 
 
 def allocating(function: F) -> F:

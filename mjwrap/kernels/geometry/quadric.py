@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import inlined, jit
+from mjwrap.kernels._jit import deferred, inlined, jit
 from mjwrap.kernels.geometry.stoermer import (
     DOUBT,
     INVERSE,
@@ -169,7 +171,7 @@ def _frame(ia, ib, ic, x, y, z, tx, ty, tz):
     return nx, ny, nz, tx, ty, tz, kappa, tau, beta
 
 
-@jit
+@deferred(types.none)
 def quadric(k, node):
     """Evaluate the geodesic of row k; positions in world directions relative to the surface's origin."""
     ia, ib, ic = inverse_squares(node, k)

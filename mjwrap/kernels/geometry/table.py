@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import deferred, jit
 from mjwrap.kernels.geometry.clearance import (
     bounded_part,
     lowest_in_quadric,
@@ -188,7 +190,7 @@ def dip(node, k, ax, ay, az, bx, by, bz):
             first, last = part_between(-node[k, DIM + 1], node[k, DIM + 1], az, dz, first, last)
         share = min(first, 1.0)
         if last > first:
-            share = _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz)
+            share = lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz)
     return _height_at(node, k, share, ax, ay, az, dx, dy, dz), share
 
 
@@ -198,8 +200,8 @@ def _height_at(node, k, share, ax, ay, az, dx, dy, dz):
     return height(node, k, ax + share * dx, ay + share * dy, az + share * dz)
 
 
-@jit
-def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
+@deferred(types.float64)
+def lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
     """Return the lowest point's share between two shares, from samples at the scale of the curvature, refined."""
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     count = int(min(math.ceil((last - first) * size / (SPACING * node[k, SIZE])), MOST_SAMPLES)) + 1

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import apart, jit
+from mjwrap.kernels._jit import deferred, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.spans.cold_start import ends_of_part
@@ -160,8 +162,8 @@ def _follow_in_strides(k, end, now, node, tol):
     return spent
 
 
-@apart
-def _follow_large_move(lo, hi, ends, node, tol, direct, found):
+@deferred(types.int64, types.float64, types.float64, types.int64, types.int64)
+def follow_large_move(lo, hi, ends, node, tol, direct, found):
     """Solve again, by continuation from before a large move; where that fails, from a cold start.
 
     found: the solve just done has found a path, which is kept where strides lead to none.
@@ -213,7 +215,7 @@ def solve_span(lo, hi, ends, node, tol, direct):
     if _is_found(status) and not (warm and _moved_far(lo, hi, ends, node)):
         return status, total, error, iterations, evaluations
     if warm and status != lay.ENDPOINT_INSIDE:
-        status, total, error, i, e = _follow_large_move(lo, hi, ends, node, tol, direct, _is_found(status))
+        status, total, error, i, e = follow_large_move(lo, hi, ends, node, tol, direct, _is_found(status))
         iterations += i
         evaluations += e
     if status == lay.ENDPOINT_INSIDE:

@@ -7,8 +7,10 @@ gets shorter.
 
 from __future__ import annotations
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import deferred, jit
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
 from mjwrap.kernels.geometry.traits import branched
 from mjwrap.kernels.spans.cold_start import wrap_in_turn
@@ -29,7 +31,7 @@ def out_of_repairs(lo, hi, repairs):
     return repairs == MAX_REPAIRS or (hi - lo == 1 and repairs == 1)
 
 
-@jit
+@deferred(types.int64)
 def repair(lo, hi, ends, node, repairs, saddle, cold):
     """Give the span another start, its repair number `repairs` from 0 on; return the evaluations spent.
 

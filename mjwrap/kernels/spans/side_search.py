@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import apart, deferred, jit
 from mjwrap.kernels.geometry.traits import branched, closed_form, drawn_hints
 from mjwrap.kernels.geometry.winding import TWO_PI
 from mjwrap.kernels.spans.active_set import (
@@ -147,7 +149,7 @@ def _whole_surfaces(lo, hi, first, last, node):
     return first, last
 
 
-@jit
+@deferred(types.int64)
 def try_other_sides(lo, hi, ends, node, passes):
     """Try other sides for all obstacles without a hint, and keep what is shorter; return the evaluations spent.
 
@@ -230,7 +232,7 @@ def _next_surface(k, hi, node):
     return min(k, hi)
 
 
-@jit
+@apart
 def try_random_hints(lo, hi, ends, node, sound):
     """Try random hints for a few neighbours at a time, and keep what is shorter; return the evaluations spent.
 
@@ -283,7 +285,7 @@ def try_random_hints(lo, hi, ends, node, sound):
     return spent
 
 
-@jit
+@deferred(types.int64)
 def search_sides(lo, hi, ends, node, passes):
     """Find the sides of a row without hints; return the evaluations spent.
 

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels._jit import jit
+from mjwrap.kernels._jit import apart, jit
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.table import bounding_radius, height, project
 from mjwrap.kernels.geometry.traits import ellipse_sections
@@ -176,7 +176,7 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
     return True
 
 
-@jit
+@apart
 def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
     """Write a first guess for the string over the section with the half plane towards w; return whether there is one.
 
