@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba.core import event
+from numba.core import event, types
 
 from mjwrap.kernels.compilation import module_caches, self_test
 from mjwrap.kernels.compilation.cache_folders import config
@@ -42,7 +42,7 @@ class _Announcer(event.Listener):
 event.register("numba:compile", _Announcer())
 
 
-def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
+def jit(function: F, kind: str = "Kernel", *further: Any, **options: bool) -> F:
     """Compile a kernel: without the GIL, IEEE arithmetic with fused multiply-adds, machine code kept on disk.
 
     A kernel whose name begins with an underscore cannot be called from Python, which makes it cheaper to compile.
@@ -57,7 +57,7 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
 
     if function.__name__.startswith("_"):
         kind, options = "Hidden", options | {"no_cpython_wrapper": True}
-    kernel: Any = getattr(linking, kind)(function, linking.OPTIONS | options)
+    kernel: Any = getattr(linking, kind)(function, linking.OPTIONS | options, *further)
     with module_caches.kept(function):
         kernel.enable_caching()
     return kernel
@@ -66,6 +66,15 @@ def jit(function: F, kind: str = "Kernel", **options: bool) -> F:
 def no_inline(function: F) -> F:
     """Compile a kernel whose code is not copied into its callers: for large kernels, where a call costs little."""
     return jit(function, "NotInlined")
+
+
+def deferred(*returns: Any) -> Callable[[F], F]:
+    """Compile a kernel only when it is first called: for large kernels that many scenes never call.
+
+    returns: the numba types of its results.
+    """
+    kind = returns[0] if len(returns) == 1 else types.Tuple(returns)
+    return lambda function: jit(function, "Deferred", kind)
 
 
 def allocating(function: F) -> F:

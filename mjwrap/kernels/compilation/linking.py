@@ -3,19 +3,23 @@
 numba compiles a function anew for every constant argument. It also copies the machine code of everything that a
 function calls, directly or not, into the function's own, and optimises it again at every level. Kernels are never
 compiled anew for a constant argument. The code of a large kernel (`NotInlined`) is not copied: its callers contain a
-call of a symbol, whose address is set where the kernel is compiled or loaded.
+call of a symbol, whose address is set where the kernel is compiled or loaded. A large kernel that many scenes never
+need (`Deferred`) is compiled or loaded when it is first called.
 """
 
 from __future__ import annotations
 
+import _thread
+import ctypes
 import hashlib
 import importlib
+import threading
 from functools import partial
 from typing import Any
 
 import llvmlite.binding as llvm
 from llvmlite import ir
-from numba.core import cgutils, sigutils, types
+from numba.core import cgutils, sigutils, types, typing
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
@@ -29,6 +33,8 @@ OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,
     "_nrt": False,  # no counting of references on every array handed on; no new arrays either
 }
+
+INTERRUPT_DELAY = 0.05  # [s] delay of an interrupt that came during a deferred compilation
 
 
 class Kernel(Dispatcher):
@@ -70,37 +76,122 @@ class NotInlined(Kernel):
         """Return what stands in compiled code for this version: a call of its symbol."""
         args = tuple(sigutils.normalize_signature(sig)[0])
         if args not in self._calls:
-            cres, key = self.overloads[args], object()
-            name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
-            symbol = f"{name}.{hashlib.sha256(str(args).encode()).hexdigest()[:16]}"
-            llvm.add_symbol(symbol, cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name))
-            load = partial(_load, self.py_func.__module__, self.py_func.__qualname__, args)
-            self.targetctx._defns[key].append(_call(cres.fndesc, symbol, load), args)
-            self._calls[args] = key
+            key = self._calls[args] = object()
+            self.targetctx._defns[key].append(self._call(args), args)
         return self._calls[args]
+
+    def _call(self, args: Any) -> Any:
+        """Return the function that generates a call of a version; set the address of its symbol."""
+        cres, symbol = self.overloads[args], _symbol(self, args)
+        llvm.add_symbol(symbol, cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name))
+
+        def callee(context: Any, builder: Any) -> Any:
+            kind = context.call_conv.get_function_type(cres.fndesc.restype, cres.fndesc.argtypes)
+            return cgutils.get_or_insert_function(builder.module, kind, symbol)
+
+        return _call(self, args, cres.fndesc.restype, cres.fndesc.argtypes, callee)
+
+    def load(self, args: Any) -> None:
+        """Set the address of a version's symbol; runs before machine code that calls the symbol is loaded."""
+        self.compile(args)
+        self.get_overload(args)
+
+
+class Deferred(NotInlined):
+    """A function that is compiled or loaded at its first call; callers need the types that it returns before that."""
+
+    def __init__(self, function: Any, options: dict[str, Any], returns: Any) -> None:
+        super().__init__(function, options)
+        self._returns = returns
+        self._kept_alive: list[object] = []
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how compiled code calls it with arguments of these types, without compiling it."""
+        signature, args = self._compiler.fold_argument_types(
+            tuple(map(types.unliteral, args)), {key: types.unliteral(kind) for key, kind in kws.items()}
+        )
+        name = self.py_func.__name__
+        found = [typing.signature(self._returns, *args)]
+        template = typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=found)
+        return template, signature, args, {}
+
+    def _call(self, args: Any) -> Any:
+        """Return the function that generates a call by address; the address is asked for at the first call."""
+        symbol, address = _symbol(self, args), ctypes.c_void_p()
+        ask = ctypes.CFUNCTYPE(None)(partial(self._provide, args, address))
+        self._kept_alive += [address, ask]
+        llvm.add_symbol(f"{symbol}.address", ctypes.addressof(address))
+        llvm.add_symbol(f"{symbol}.ask", ctypes.cast(ask, ctypes.c_void_p).value)
+        callee = partial(_callee_by_address, symbol, self._returns, args)
+        return _call(self, args, self._returns, args, callee)
+
+    def _provide(self, args: Any, address: Any) -> None:
+        """Compile or load a version and store its address; an interrupt (Ctrl-C) is raised after that."""
+        interrupted = False
+        while address.value is None:
+            try:
+                self.compile(args)
+                cres = self.overloads[args]
+                if cres.fndesc.restype != self._returns:
+                    raise TypeError(
+                        f"{self.py_func.__name__} returns {cres.fndesc.restype}, not {self._returns}"
+                    )
+                address.value = cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name)
+            except KeyboardInterrupt:
+                interrupted = True
+        # an exception raised inside a callback would be lost: raise it after the caller has returned
+        if interrupted:
+            threading.Timer(INTERRUPT_DELAY, _thread.interrupt_main).start()
+
+    def load(self, args: Any) -> None:
+        """Define the symbols of a version; runs before machine code that calls them is loaded."""
+        self.get_overload(args)
+
+
+def _symbol(kernel: Any, args: Any) -> str:
+    """Return the symbol of a version."""
+    name = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
+    return f"{name}.{hashlib.sha256(str(args).encode()).hexdigest()[:16]}"
 
 
 def _load(module: str, name: str, args: Any) -> None:
-    """Set the address of a version's symbol; runs before machine code that calls the symbol is loaded."""
-    kernel = getattr(importlib.import_module(module), name)
-    kernel.compile(args)
-    kernel.get_overload(args)
+    """Define the symbols of a version of a kernel."""
+    getattr(importlib.import_module(module), name).load(args)
 
 
-def _call(fndesc: Any, symbol: str, load: Any) -> Any:
-    """Return the function that generates a call by symbol; `load` is stored with the machine code of the caller."""
+def _call(kernel: Any, args: Any, returns: Any, kinds: Any, callee: Any) -> Any:
+    """Return the function that generates a call of a version; `_load` is stored with the machine code of the caller."""
+    load = partial(_load, kernel.py_func.__module__, kernel.py_func.__qualname__, args)
 
     def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         context.active_code_library._reload_init.add(load)
-        convention = context.call_conv
-        kind: ir.FunctionType = convention.get_function_type(fndesc.restype, fndesc.argtypes)
-        function = cgutils.get_or_insert_function(builder.module, kind, symbol)
-        status, value = convention.call_function(
-            builder, function, fndesc.restype, fndesc.argtypes, arguments
-        )
+        function = callee(context, builder)
+        status, value = context.call_conv.call_function(builder, function, returns, kinds, arguments)
         with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
+            context.call_conv.return_status_propagate(builder, status)
         return value
 
-    write.signature = fndesc.argtypes  # pyright: ignore[reportFunctionMemberAccess]
+    write.signature = kinds  # pyright: ignore[reportFunctionMemberAccess]
     return write
+
+
+def _callee_by_address(symbol: str, returns: Any, args: Any, context: Any, builder: Any) -> Any:
+    """Return a function, added to the caller's module, that calls a version with its own arguments."""
+    module, convention = builder.module, context.call_conv
+    name, kind = f"{symbol}.deferred", convention.get_function_type(returns, args)
+    if name in module.globals:
+        return module.globals[name]
+    function = ir.Function(module, kind, name)
+    function.linkage = "internal"
+    pointer = kind.as_pointer()
+    address = ir.GlobalVariable(module, pointer, f"{symbol}.address")
+    ask = cgutils.get_or_insert_function(module, ir.FunctionType(ir.VoidType(), ()), f"{symbol}.ask")
+    inner = ir.IRBuilder(function.append_basic_block())
+    for _ in range(2):
+        found = inner.load(address)
+        with inner.if_then(cgutils.is_not_null(inner, found), likely=True):
+            inner.ret(inner.call(found, function.args))
+        if _ == 0:
+            inner.call(ask, ())
+    convention.return_user_exc(inner, RuntimeError, (f"{symbol} cannot be compiled",))
+    return function

@@ -1,7 +1,7 @@
 """Test whether `linking.py` works with the installed numba; where it does not, kernels are plain numba functions.
 
 `linking.py` uses inner parts of numba, which may change in any release. Releases with which mjwrap was tested are
-accepted. Any other release has to compile, store and load three small functions (`probe.py`), once, which takes about
+accepted. Any other release has to compile, store and load four small functions (`probe.py`), once, which takes about
 a second. The result is kept on the disk.
 """
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.clearance import (
     bounded_part,
     lowest_in_quadric,
@@ -47,7 +49,7 @@ from mjwrap.kernels.geometry.winding import (
 KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
 NAN = math.nan
 
-# `_lowest_by_samples`, for surfaces that are not convex; lengths are shares of the surface's size.
+# `lowest_by_samples`, for surfaces that are not convex; lengths are shares of the surface's size.
 SAMPLE_SPACING = 0.4  # distance between two samples of the height along the segment
 MAX_SAMPLES = 200  # most samples of one segment
 DEEP_ENTRY = 1e-3  # a segment that enters deeper than this has its lowest point located less exactly, ...
@@ -189,7 +191,7 @@ def segment_clearance(node, k, ax, ay, az, bx, by, bz):
             first, last = part_between(-node[k, DIM + 1], node[k, DIM + 1], az, dz, first, last)
         share = min(first, 1.0)
         if last > first:
-            share = _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz)
+            share = lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz)
     return _height_at(node, k, share, ax, ay, az, dx, dy, dz), share
 
 
@@ -199,8 +201,8 @@ def _height_at(node, k, share, ax, ay, az, dx, dy, dz):
     return height(node, k, ax + share * dx, ay + share * dy, az + share * dz)
 
 
-@jit
-def _lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
+@deferred(types.float64)
+def lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
     """Return the share of AB of the lowest point between two shares: samples of the height, then golden sections."""
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     count = int(min(math.ceil((last - first) * size / (SAMPLE_SPACING * node[k, SIZE])), MAX_SAMPLES)) + 1

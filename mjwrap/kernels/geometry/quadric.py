@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import inlined, jit
+from mjwrap.kernels.compilation.jit import deferred, inlined, jit
 from mjwrap.kernels.geometry.stoermer import (
     ERROR_WEIGHT,
     INVERSE,
@@ -168,7 +170,7 @@ def _frame(ia, ib, ic, x, y, z, tx, ty, tz):
     return nx, ny, nz, tx, ty, tz, kappa, tau, beta
 
 
-@jit
+@deferred(types.none)
 def quadric(k, node):
     """Evaluate the geodesic of row k; positions in world directions relative to the surface's origin."""
     ia, ib, ic = inverse_squares(node, k)

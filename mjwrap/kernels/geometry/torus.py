@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import inlined, jit
+from mjwrap.kernels.compilation.jit import deferred, inlined, jit
 from mjwrap.kernels.geometry.stoermer import (
     ERROR_WEIGHT,
     INVERSE,
@@ -108,7 +110,7 @@ def _step(h, p, z, dp, dz, a, da, r, dr, major, ir, c2):
     )  # fmt: skip
 
 
-@jit
+@deferred(types.none)
 def torus(k, node):
     """Evaluate the geodesic of row k; positions in world directions relative to the surface's origin."""
     major, minor = node[k, DIM], node[k, DIM + 1]

@@ -104,7 +104,7 @@ def _init(lo, hi, ends, node, direct):
         evaluations += search_sides(lo, hi, ends, node, COLD_PASSES)
     elif cold or (direct and lone):
         evaluations += wrap_in_turn(lo, hi, ends, node, _cold_start_passes(lo, hi, node), False)
-        if cold and lone and closed_form(lo, node):
+        if cold and lone and closed_form(lo, node) and node[lo, HINT] <= 0.0:
             evaluations += try_other_sides(lo, hi, ends, node, 1)
     if cold:
         save_solutions(lo, hi, node, W_OLD)

@@ -23,8 +23,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import inlined, jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, inlined, jit
 from mjwrap.kernels.geometry.dispatch import nearest
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.geometry.traits import closed_form
@@ -97,7 +99,7 @@ def _lift_all(lo, hi, node):
             node[k, S_MODE + i] = 0.0
 
 
-@no_inline
+@deferred(types.float64, types.float64, types.int64, types.int64)
 def substitute_path(lo, hi, ends, node, tol, direct):
     """Find the substitute path of a span with an end inside; return (length, error, iterations, evaluations).
 

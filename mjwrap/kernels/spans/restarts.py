@@ -7,8 +7,10 @@ length is first moved sideways, in a direction in which it gets shorter.
 
 from __future__ import annotations
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.geodesics import displace, geodesic
 from mjwrap.kernels.geometry.traits import branched
 from mjwrap.kernels.spans.cold_start import wrap_in_turn
@@ -30,7 +32,7 @@ def out_of_restarts(lo, hi, restarts):
     return restarts == MAX_RESTARTS or (hi - lo == 1 and restarts == 1)
 
 
-@jit
+@deferred(types.int64)
 def restart(lo, hi, ends, node, restarts, saddle, cold):
     """Give the span another starting point; return the number of evaluations.
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit, no_inline
 from mjwrap.kernels.geometry.traits import branched, closed_form, random_starts
 from mjwrap.kernels.geometry.winding import TWO_PI
 from mjwrap.kernels.spans.cold_start import ends_of_part, path_length, wrap_in_turn
@@ -149,7 +151,7 @@ def _whole_surfaces(lo, hi, first, last, node):
     return first, last
 
 
-@jit
+@deferred(types.int64)
 def try_other_sides(lo, hi, ends, node, passes):
     """Try other sides for all obstacles without a hint, and keep shorter paths; return the number of evaluations.
 
@@ -232,7 +234,7 @@ def _next_surface(k, hi, node):
     return min(k, hi)
 
 
-@jit
+@no_inline
 def try_random_hints(lo, hi, ends, node, sound):
     """Try random hints for a few neighbours at a time, and keep shorter paths; return the number of evaluations.
 
@@ -285,7 +287,7 @@ def try_random_hints(lo, hi, ends, node, sound):
     return spent
 
 
-@jit
+@deferred(types.int64)
 def search_sides(lo, hi, ends, node, passes):
     """Find the sides of a row without hints; return the number of evaluations.
 

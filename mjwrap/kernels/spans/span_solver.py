@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.spans.active_set_method import solve_active_set
@@ -163,8 +165,8 @@ def _continue_to_present_ends(k, end, now, node, tol):
     return spent
 
 
-@no_inline
-def _solve_by_continuation(lo, hi, ends, node, tol, direct, found):
+@deferred(types.int64, types.float64, types.float64, types.int64, types.int64)
+def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
     """Solve again after a large move, by continuation from the last pose; where that fails, from a cold start.
 
     found: the solve before has found a path; where the continuation fails, the solution before the move is used again
@@ -219,9 +221,7 @@ def solve_span(lo, hi, ends, node, tol, direct):
     if _is_found(status) and not (warm and _moved_far(lo, hi, ends, node)):
         return status, total, error, iterations, evaluations
     if warm and status != lay.ENDPOINT_INSIDE:
-        status, total, error, i, e = _solve_by_continuation(
-            lo, hi, ends, node, tol, direct, _is_found(status)
-        )
+        status, total, error, i, e = solve_by_continuation(lo, hi, ends, node, tol, direct, _is_found(status))
         iterations += i
         evaluations += e
     if status == lay.ENDPOINT_INSIDE:

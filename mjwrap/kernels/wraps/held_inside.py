@@ -17,8 +17,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.vectors import rotate
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
@@ -158,7 +160,7 @@ def normal(k, x, y, z, node):
     return (x - along * ux) * over, (y - along * uy) * over, (z - along * uz) * over
 
 
-@no_inline
+@deferred(types.int64, types.float64, types.float64, types.int64)
 def solve_held_inside(k, ends, node, tol):
     """Find the shortest string from A to B that meets obstacle k's solid; return (status, length, error, steps).
 

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import jit, no_inline
 from mjwrap.kernels.geometry.dispatch import bounding_radius, height, project
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.traits import ellipse_sections
@@ -176,7 +176,7 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
     return True
 
 
-@jit
+@no_inline
 def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
     """Write an initial guess for the string over the section in the half plane towards w; return whether there is one.
 

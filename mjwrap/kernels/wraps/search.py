@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.stoermer import carray, stack
@@ -70,7 +72,7 @@ def _leave_free(k, node, sweep, low, ax, ay, az, bx, by, bz):
     node[k, S_T + 2] = bz
 
 
-@jit
+@deferred(types.int64)
 def wrap_by_search(k, ends, node, search):
     """Wrap the string from A to B over obstacle k; return the sum of A_INSIDE and B_INSIDE, as they apply.
 
