@@ -19,9 +19,10 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from llvmlite import ir
-from numba.core import cgutils, sigutils, types, typing
+from numba.core import cgutils, sigutils, types
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
+from numba.core.typing import templates
 
 Dispatcher: Any = CPUDispatcher
 OPTIONS: dict[str, Any] = {
@@ -111,8 +112,8 @@ class Deferred(NotInlined):
             tuple(map(types.unliteral, args)), {key: types.unliteral(kind) for key, kind in kws.items()}
         )
         name = self.py_func.__name__
-        found = [typing.signature(self._returns, *args)]
-        template = typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=found)
+        found = [templates.signature(self._returns, *args)]
+        template = templates.make_concrete_template(f"CallTemplate({name})", key=name, signatures=found)
         return template, signature, args, {}
 
     def _call(self, args: Any) -> Any:
