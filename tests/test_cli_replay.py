@@ -238,14 +238,14 @@ def test_arrays_of_states_need_no_names(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["{states}"], "is a table of states: --model says of which model"),
+        (["{states}"], "is a table of states: name its model with --model"),
         (["{states}", "--model", "nowhere.xml"], "nowhere.xml does not exist"),
         (["{states}", "--model", CASE2], "no column names a joint; the model has: cylinder_y"),
         (["{states}", "--model", ELBOW, "--out", "{folder}/t.pdf"], "must end in .sto"),
         (["{states}", "--model", ELBOW, "--record", "{folder}/r.txt"], "must end in .rrd"),
         (["{states}", "--model", ELBOW, "--keyframe", "bent", "--info"], "'bent'; keyframes"),
         (["{folder}/no.csv", "--model", ELBOW], "no such file"),
-        (["{folder}/no.rrd", "--model", ELBOW], "--model goes with a table of states"),
+        (["{folder}/no.rrd", "--model", ELBOW], "--model needs a table of states"),
         (["{folder}/no.rrd"], "there is no recording"),
     ],
 )

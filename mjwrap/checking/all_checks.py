@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.differences import Neighbourhood, extrapolated_error, orders
 from mjwrap.checking.energy import check_energy
-from mjwrap.checking.forces import balance_check, look_at_forces, power_check, work_check
+from mjwrap.checking.forces import balance_check, evaluate_forces, power_check, work_check
 from mjwrap.checking.outcome import Check, Checks
 from mjwrap.checking.sweeps import Paths, Sweeper
 from mjwrap.errors import ModelError
@@ -79,7 +79,7 @@ def check_model(
         muscles.excitation = rng.uniform(0.1, 1.0, muscles.n)
         muscles.reset(data)
         measured.append(_derivatives(muscles, data, where, speed, arms, paths))
-        look_at_forces(muscles, data, where, forces)
+        evaluate_forces(muscles, data, where, forces)
     found = np.concatenate([np.empty(0), *measured])
     if found.size:
         arms.remarks.append(f"differences come to it at order {np.median(found):.2f} (second order is 2)")
@@ -102,7 +102,7 @@ def _derivatives(
     """Compare l̇ and ∂l/∂q at a pose with differences of l; return the orders at which these come to ∂l/∂q."""
     model = muscles.model
     jacobian = muscles.length_jacobian(data)
-    paths.look(muscles, where)
+    paths.record(muscles, where)
     velocity, length = muscles.velocity, muscles.length
     around = Neighbourhood(muscles, data)
     size = np.maximum(np.abs(jacobian).max(axis=1, initial=0.0), 1e-3 * length)

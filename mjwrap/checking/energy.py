@@ -17,7 +17,7 @@ from mjwrap.text import counted
 Array = NDArray[np.float64]
 SECONDS, ACTIVATION, LIMIT = 0.1, 0.1, 1e-6
 TIMESTEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # [s]
-HELD = 1e6  # times the armature: a joint that stands still
+STANDSTILL_FACTOR = 1e6  # times the armature: a joint that stands still
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -39,7 +39,7 @@ def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
         dofs = np.flatnonzero(kinds == kind)
         model.dof_armature[dofs] += np.max(model.dof_M0[dofs], initial=0.0)
     coupled = [coupling.joint for coupling in read_couplings(model)]
-    model.dof_armature[model.jnt_dofadr[coupled]] *= HELD
+    model.dof_armature[model.jnt_dofadr[coupled]] *= STANDSTILL_FACTOR
     return model
 
 

@@ -28,7 +28,7 @@ def power_check() -> Check:
     return Check("power", "power of each muscle's forces is -F dl/dt", 1e-9, "of its parts")
 
 
-def look_at_forces(
+def evaluate_forces(
     muscles: MuscleSystem, data: mujoco.MjData, where: str, checks: tuple[Check, Check, Check]
 ) -> None:
     """Apply the muscles' forces at the state in `data`, from a cold start, and compare.

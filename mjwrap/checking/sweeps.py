@@ -7,9 +7,9 @@ import numpy as np
 
 from mjwrap.checking.outcome import Check
 from mjwrap.paths import Status
+from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.continuity import NARROW
 from mjwrap.poses.joint_sweeps import PoseMaker
-from mjwrap.poses.walking import Walker
 from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 
@@ -26,7 +26,7 @@ class Paths:
         self._without: dict[Status, dict[str, list[str]]] = {}
         self.poses = 0
 
-    def look(self, muscles: MuscleSystem, where: str) -> None:
+    def record(self, muscles: MuscleSystem, where: str) -> None:
         """Look at the muscles' last evaluation."""
         status, names = muscles.status, muscles.names
         self.poses += 1
@@ -55,19 +55,19 @@ class Sweeper:
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData, paths: Paths, jumps: Check) -> None:
         self._muscles, self._paths, self._jumps = muscles, paths, jumps
-        self._walker = Walker(muscles, data)
+        self._follower = PathFollower(muscles, data)
 
     def sweep(self, maker: PoseMaker, joint: int, axis: int, samples: int) -> None:
         """Sweep a joint over its range, from the pose around which it is swept."""
         motion, place = maker.sweep(joint, samples, axis), maker.maker(joint, axis)
         name, muscles, beside = motion.name, self._muscles, 2.0 * NARROW * float(np.ptp(motion.at))
-        self._walker.come(maker.base, motion.qpos[0])
-        walk = self._walker.walk(
-            place, motion.at, lambda value: self._paths.look(muscles, f"{name} = {value:.4f}")
+        self._follower.move_to(maker.base, motion.qpos[0])
+        trace = self._follower.trace(
+            place, motion.at, lambda value: self._paths.record(muscles, f"{name} = {value:.4f}")
         )
         self._jumps.count += muscles.n
-        for i, (at, size, turn) in self._walker.jumps(place, walk):
-            before, after = (self._walker.touched(place, walk, i, at + side) for side in (-beside, beside))
+        for i, (at, size, turn) in self._follower.jumps(place, trace):
+            before, after = (self._follower.touched(place, trace, i, at + side) for side in (-beside, beside))
             what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
             self._jumps.worst += 1.0
             self._jumps.remarks.append(

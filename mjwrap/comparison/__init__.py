@@ -9,9 +9,9 @@ from __future__ import annotations
 from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.motion import MotionDifference, compare_motion, with_native_laws
 from mjwrap.comparison.pose_comparison import PoseComparison, compare_poses
-from mjwrap.comparison.sentences import Verdict, verdict
 from mjwrap.comparison.tables import TableDifference, compare_tables
 from mjwrap.comparison.verdict import AGREE, MuscleSummary, Outcome
+from mjwrap.comparison.verdict_text import Verdict, verdict
 
 __all__ = [
     "AGREE",

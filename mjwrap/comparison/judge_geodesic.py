@@ -19,7 +19,7 @@ Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
 ANGLE = 1e-9  # [rad] largest corner; both programs' contact points are closed-form or polished to 1e-10
-HELD = 2e-6  # [rad] the same of MuJoCo's corner inside a geom, which it finds to 1e-6 rad
+INSIDE_TOLERANCE = 2e-6  # [rad] the same of MuJoCo's corner inside a geom, which it finds to 1e-6 rad
 DEPTH = 1e-12  # [radii] deepest that a straight segment may pass below a surface, for rounding alone
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.comparison.jumps import Jump, find_jumps
 from mjwrap.comparison.motion import pristine
-from mjwrap.comparison.twins import Batch, Comparer
+from mjwrap.comparison.paired_evaluation import Batch, Comparer
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.errors import ModelError
 from mjwrap.poses.joint_sweeps import PoseMaker
@@ -96,11 +96,11 @@ def compare_poses(
 
     def take(batch: Batch) -> None:
         found.poses += len(batch.motion.at)
-        for twin in batch.twins:
+        for pair in batch.pairs:
             summary = found.muscles.setdefault(
-                twin.name, MuscleSummary(twin.name, muscles.native.get(twin.name, ""))
+                pair.name, MuscleSummary(pair.name, muscles.native.get(pair.name, ""))
             )
-            summary.add(model, batch.motion, twin)
+            summary.add(model, batch.motion, pair)
         if each is not None:
             each(batch)
 

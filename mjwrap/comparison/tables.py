@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.comparison.motion import pristine
-from mjwrap.comparison.twins import Comparer
+from mjwrap.comparison.paired_evaluation import Comparer
 from mjwrap.errors import TableError
 from mjwrap.files import Table
 from mjwrap.system import MuscleSystem
@@ -57,7 +57,7 @@ class TableDifference:
     table: float
 
 
-class Beside(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of a table, and what both programs have there, (T,) each: nan where one has no path.
 
     about: the joint of the moment arms [m], or "" for lengths [m].
@@ -78,7 +78,7 @@ def compare_tables(
     lengths: Table | None = None,
     moment_arms: Mapping[str, Table] | None = None,
     *,
-    each: Callable[[Beside], object] | None = None,
+    each: Callable[[TableColumn], object] | None = None,
 ) -> list[TableDifference]:
     """Compare MuJoCo's tendons and mjwrap's paths with tables of another program, muscle by muscle.
 
@@ -112,7 +112,7 @@ def compare_tables(
 
 def _compare(
     model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str,
-    each: Callable[[Beside], object] | None,
+    each: Callable[[TableColumn], object] | None,
 ) -> list[TableDifference]:  # fmt: skip
     dof = _dof(model, joint) if joint else -1
     muscles = MuscleSystem(model)
@@ -146,7 +146,7 @@ def _compare(
     for name in known:
         if name in columns and each is not None:
             both = [values.get((program, name), absent) for program in ("MuJoCo", "mjwrap")]
-            each(Beside(name, joint, table.time, columns[name], *both))
+            each(TableColumn(name, joint, table.time, columns[name], *both))
     told = [
         _difference(name, program, joint, table.time, value, columns[name])
         for (program, name), value in values.items()

@@ -15,7 +15,7 @@ from mjwrap.errors import GeometryError
 from mjwrap.fitting import shapes
 from mjwrap.fitting.least_squares import LOST, growth, solve
 from mjwrap.fitting.shapes import Array, Shape
-from mjwrap.fitting.symmetry import settled
+from mjwrap.fitting.symmetry import canonical_frame
 from mjwrap.paths import Obstacle
 from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
 
@@ -133,7 +133,7 @@ def _fit(shape: Shape, points: ArrayLike, scale: float | None) -> Fit:
         raise GeometryError(f"fit of {shape.name}: all {len(x)} points are the same")
     scaled = (x - mean) / unit
     try:
-        found, half = settled(solve(shape, scaled, None if scale is None else scale / unit), scaled)
+        found, half = canonical_frame(solve(shape, scaled, None if scale is None else scale / unit), scaled)
         increase = growth(found, scaled, half)
         lengths = np.ones(shape.sizes)
         lengths[[i for i in range(shape.sizes) if i not in shape.ratios]] = unit

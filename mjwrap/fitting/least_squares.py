@@ -10,8 +10,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from mjwrap.errors import GeometryError
+from mjwrap.fitting.initial_guesses import guesses
 from mjwrap.fitting.shapes import Array, Nearest, Shape
-from mjwrap.fitting.starts import guesses
 from mjwrap.surfaces.triangles import surface_grid
 
 TRIED = 300  # points that all guesses are tried with

@@ -14,7 +14,7 @@ from mjwrap.fitting.shapes import Array
 _LONG = (shapes.CYLINDER, shapes.ELLIPTIC_CYLINDER, shapes.CONE)  # cut off where their points end
 
 
-def settled(posed: Posed, x: Array) -> tuple[Posed, float]:
+def canonical_frame(posed: Posed, x: Array) -> tuple[Posed, float]:
     """Return the same surface in the frame turned least, and its half length: as far as points x (m, 3) reach.
 
     The origin of cylinders and cones moves to the middle of the points' reach; a cone ends at its apex at the latest.

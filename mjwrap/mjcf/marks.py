@@ -5,7 +5,7 @@ another one. So what mjwrap must know again afterwards stands in entries that Mu
 
 - `actuator_gainprm[i, 9]` and `actuator_biasprm[i, 9]`: the lowest and highest force that actuator i had before it was
   disabled (∓mjMAXVAL: no limits). Written by `model/takeover.py` into a model and by `plugin/spec/actuators.py` into a
-  spec; read by both, `plugin/blocks/image.py` and `plugin/callbacks/follow.py`.
+  spec; read by both, `plugin/blocks/image.py` and `plugin/callbacks/sync.py`.
 - `actuator_forcerange[i]`, 0 to 0 in a model and 0 to 1e-12 in a spec: actuator i is disabled. By and for the same.
 - `actuator_dynprm[i, 9]`, 1: gain and bias of actuator i were a muscle's. By and for `plugin/spec/tendons.py`.
 - `wrap_prm[tendon_adr[t]]`, where `tendon_num[t]` is 0: how many stops tendon t had. By and for the same.

@@ -12,7 +12,7 @@ from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
-from mjwrap.plugin.blocks.reading import read_muscles
+from mjwrap.plugin.blocks.instance_muscles import read_muscles
 from mjwrap.plugin.blocks.transmission_part import check_moment_columns
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error

@@ -15,7 +15,7 @@ import threading
 from mjwrap.errors import VersionError
 from mjwrap.mjcf.marks import PLUGIN_NAME
 from mjwrap.plugin.blocks.allocation import entries, give_block
-from mjwrap.plugin.blocks.reading import is_reading
+from mjwrap.plugin.blocks.instance_muscles import is_reading
 from mjwrap.plugin.callbacks.hooks import compile_hooks
 from mjwrap.plugin.mujoco_c.offsets import offsets
 from mjwrap.plugin.mujoco_c.probe import verify_plugin_fields

@@ -17,7 +17,7 @@ LASTING = 0.5  # a jump keeps this share of its size while the width shrinks a t
 MOST = 3  # intervals looked into, for each muscle, sweep and kind
 
 
-def odd_intervals(
+def jump_candidates(
     at: Array, length: Array, slope: Array, good: NDArray[np.bool_]
 ) -> list[tuple[int, float | None]]:
     """Return the intervals in which length (None) or slope (its usual bend) change as a smooth curve would not.

@@ -12,7 +12,7 @@ from mjwrap.recording import columns
 from mjwrap.recording.blueprint import First, blueprint
 from mjwrap.recording.scene import Scene
 from mjwrap.recording.stream import Stream
-from mjwrap.system.history import Room
+from mjwrap.system.history import BufferPool
 
 if TYPE_CHECKING:
     from mjwrap.system.results import Results
@@ -31,7 +31,7 @@ class Options(NamedTuple):
     force_scale: float | None
 
 
-class Beat:
+class SampleTimer:
     """Due at the first time at or after every whole multiple of a period from its first time on."""
 
     def __init__(self, rate: float | None) -> None:
@@ -68,7 +68,7 @@ class Buffers:
 
     def __init__(self, scene: Scene, muscles: "Results", rows: int, options: Options) -> None:
         self._scene, self._muscles, self._options = scene, muscles, options
-        self._states, self._displays = Beat(options.rate), Beat(options.path_rate)
+        self._states, self._displays = SampleTimer(options.rate), SampleTimer(options.path_rate)
         self._time = np.empty(rows)
         self._frame_rows = np.empty(rows, dtype=np.int64)  # the row that each frame belongs to
         self._qpos = np.zeros((rows, scene.model.nq))
@@ -82,7 +82,7 @@ class Buffers:
         )
         self._force_scale = options.force_scale
         self._tables = _tables(scene)
-        self._room = Room()
+        self._pool = BufferPool()
         self._before = np.zeros(len(scene.muscle_names))  # status of the last row that was taken
         self._rows = self._frames = 0
         self._last_time = self._next_time = -math.inf
@@ -144,7 +144,7 @@ class Buffers:
         done: whether the batches that were taken before are written, so that theirs may be overwritten.
         """
         if not done:
-            self._room = Room()
+            self._pool = BufferPool()
         batches = self._take_states() if self._rows else []
         if self._frames:
             batches += self._take_frames()
@@ -181,7 +181,7 @@ class Buffers:
 
     def _scalars(self, name: str, values: np.ndarray) -> list[pa.Array]:
         """Columns of values (T, m) that stand in the room of a name."""
-        return columns.scalar_columns(values, self._room.array(name, values.shape[::-1]))
+        return columns.scalar_columns(values, self._pool.array(name, values.shape[::-1]))
 
     def _summed(self, values: np.ndarray) -> np.ndarray:
         """Sums of values (T, n) over each group, (T, groups)."""
@@ -200,16 +200,16 @@ class Buffers:
             batches.append(self._tables["joints"].batch(self._qpos_time[: self._frames], cells))
         if self._widths:
             arms = self._history.moment_arms(self._frames)
-            room = self._room.array("moment_arm", (arms.size,))
+            pool = self._pool.array("moment_arm", (arms.size,))
             batches.append(
-                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, room))
+                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, pool))
             )
         colors = columns.activation_colors(self._history.states(self._rows)["activation"][rows])
         history, frames = self._history, self._frames
         drawn = (
-            history.polylines(frames, self._room),
-            history.contacts(frames, self._room),
-            history.arrows(frames, self._force_scale or 1.0, self._room),
+            history.polylines(frames, self._pool),
+            history.contacts(frames, self._pool),
+            history.arrows(frames, self._force_scale or 1.0, self._pool),
         )
         cells = columns.path_columns(*drawn, colors)
         batches.append(self._tables["paths"].batch(times, cells))

@@ -22,14 +22,14 @@ class Engine(Protocol):
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    seen: mujoco.MjData
+    sampled: mujoco.MjData
     muscles: MuscleSystem
 
     def step(self) -> None:
         """Advance by one time step; `StateError` where the motion becomes unstable."""
         ...
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate the muscles at the present state."""
         ...
 
@@ -44,13 +44,13 @@ class PythonEngine:
     def __init__(self, source: str, strict: bool) -> None:
         self.model = load(source)
         self.muscles = MuscleSystem(self.model, strict=strict)
-        self.data = self.seen = mujoco.MjData(self.model)
+        self.data = self.sampled = mujoco.MjData(self.model)
 
     def step(self) -> None:
         """Advance by one time step."""
         self.muscles.step(self.data)
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate the muscles at the present state."""
         self.muscles.forward(self.data)
 
@@ -70,7 +70,7 @@ class PluginEngine:
         self.model = install(load_spec(source), mode)
         self.data = mujoco.MjData(self.model)
         self.muscles = MuscleSystem(load(source))
-        self.seen = mujoco.MjData(self.muscles.model)
+        self.sampled = mujoco.MjData(self.muscles.model)
         self._strict = strict
         self._excitations = excitations(self.data)
         self._copy = mujoco.MjData(self.model)
@@ -98,18 +98,18 @@ class PluginEngine:
             for name, why in self.failures().items():
                 raise PathError(f"muscle '{name}' at time {self.data.time:g} s: {why}")
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Take the state over and evaluate the muscles there."""
-        seen, data = self.seen, self.data
-        seen.time = data.time
+        sampled, data = self.sampled, self.data
+        sampled.time = data.time
         for name in ("qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat"):
-            getattr(seen, name)[:] = getattr(data, name)
+            getattr(sampled, name)[:] = getattr(data, name)
         if self._own:
             held = self._read(self.fresh())
             places = {i: held.names.index(self.muscles.names[i]) for i in self._own}
             own = {i: (float(held.activation[k]), float(held.fiber_length[k])) for i, k in places.items()}
-            put_own(self.muscles, seen, own)
-        self.muscles.forward(seen)
+            put_own(self.muscles, sampled, own)
+        self.muscles.forward(sampled)
 
     def failures(self) -> dict[str, str]:
         """Return, by muscle, on how many steps it had no path, and why, where that is so now."""

@@ -97,7 +97,7 @@ class Simulation:
         """
         self.prescribed.place(self.engine.data)
         self.excitation.write(self.engine.data)
-        self.engine.look()
+        self.engine.evaluate()
         muscles = self.muscles
         inside = muscles.held & (muscles.status == Status.ENDPOINT_INSIDE)
         for i in np.flatnonzero(inside)[:1].tolist():
@@ -136,9 +136,9 @@ class Simulation:
         """Log the present state; return the time [s] that it took."""
         started = time.perf_counter()
         if logs:
-            self.engine.look()
+            self.engine.evaluate()
             for log in logs:
-                log(self.engine.seen)
+                log(self.engine.sampled)
         return time.perf_counter() - started
 
 

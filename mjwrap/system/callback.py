@@ -19,7 +19,7 @@ class _Step(NamedTuple):
     """A step in progress: what puts its forces in, and what takes them out before others look."""
 
     act: Callable[[], None]
-    retreat: Callable[[], None]
+    remove_forces: Callable[[], None]
 
 
 _LOCK = threading.Lock()
@@ -31,7 +31,7 @@ def _dispatch(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Call a controller written in Python, then the step that `data` belongs to."""
     step = _STEPS.get(data._address)
     if step is not None:
-        step.retreat()
+        step.remove_forces()
     _before(model, data)
     if step is not None:
         step.act()
@@ -47,7 +47,7 @@ def _dispatch_addresses(model: int, data: int) -> None:
     step = _STEPS.get(data)
     if _before is not None:
         if step is not None:
-            step.retreat()
+            step.remove_forces()
         _before(model, data)
     if step is not None:
         step.act()
@@ -55,7 +55,7 @@ def _dispatch_addresses(model: int, data: int) -> None:
 
 @contextmanager
 def control_callback(
-    data: mujoco.MjData, act: Callable[[], None], retreat: Callable[[], None]
+    data: mujoco.MjData, act: Callable[[], None], remove_forces: Callable[[], None]
 ) -> Iterator[None]:
     """Run `act` in MuJoCo's control callback for `data`, for the length of a with block.
 
@@ -69,7 +69,7 @@ def control_callback(
             _before = mujoco.get_mjcb_control()
             native = _before is None or hasattr(_before, "argtypes")  # a C function pointer
             mujoco.set_mjcb_control(_dispatch_addresses if native else _dispatch)
-        _STEPS[address] = _Step(act, retreat)
+        _STEPS[address] = _Step(act, remove_forces)
     try:
         yield
     finally:

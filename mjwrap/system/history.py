@@ -19,7 +19,7 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
 
-class Room:
+class BufferPool:
     """Arrays that are used again, by name: memory that the system has once given costs nothing the next time."""
 
     def __init__(self) -> None:
@@ -127,14 +127,14 @@ class History:
         """Return positions (frames, nbody, 3) [m] and quaternions (frames, nbody, 4) w-x-y-z of the bodies."""
         return self._positions[:frames], self._quaternions[:frames]
 
-    def polylines(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints, Ints]:
+    def polylines(self, frames: int, pool: BufferPool | None = None) -> tuple[Singles, Ints, Ints]:
         """Return the paths of the first frames: points (m, 3) [m], sizes (S,) and counts (n, frames) of strips.
 
         A pulley parts a muscle's path into several strips. They come by muscle, then by frame; sizes says how many
         points each has, counts how many strips a muscle has in a frame: none where no path was found yet.
         """
         store, routes = self._points, self._plan[0]
-        out, counts = self._room(room, "points", store, frames)
+        out, counts = self._pool(pool, "points", store, frames)
         sizes = np.empty(len(routes) * frames, dtype=np.int64)
         first = np.searchsorted(
             routes[:, muscle_paths.R_MUSCLE], np.arange(len(counts) + 1)
@@ -144,30 +144,32 @@ class History:
         count = recorded_frames.list_strips(store.starts, routes, sizes, counts)
         return out, sizes[:count], counts
 
-    def contacts(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints]:
+    def contacts(self, frames: int, pool: BufferPool | None = None) -> tuple[Singles, Ints]:
         """Return the contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
         store = self._contacts
-        out, counts = self._room(room, "contacts", store, frames)
+        out, counts = self._pool(pool, "contacts", store, frames)
         recorded_frames.gather(store.rows, store.starts, self._where, out, counts)
         return out, counts
 
-    def arrows(self, frames: int, scale: float, room: Room | None = None) -> tuple[Singles, Singles, Ints]:
+    def arrows(
+        self, frames: int, scale: float, pool: BufferPool | None = None
+    ) -> tuple[Singles, Singles, Ints]:
         """Return the forces on bodies as arrows, by muscle, then frame: tails, vectors (m, 3) [m], counts (n, frames).
 
         A vector is `scale` [m/N] times the force, world frame. Pulls start at the origin and at the insertion; what
         presses a surface or a via point, the sum over the contact, ends midway between the contact points.
         """
         store = self._forces
-        tails, counts = self._room(room, "tails", store, frames)
-        vectors, _ = self._room(room, "vectors", store, frames)
+        tails, counts = self._pool(pool, "tails", store, frames)
+        vectors, _ = self._pool(pool, "vectors", store, frames)
         recorded_frames.gather_arrows(
             store.rows, store.starts, self._where, float(scale), tails, vectors, counts
         )
         return tails, vectors, counts
 
-    def _room(self, room: Room | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
+    def _pool(self, pool: BufferPool | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
         """Return room for the points of a store's first frames in another order, and for their counts."""
-        points = (room or Room()).array(name, (store.count(frames), 3), np.float32)
+        points = (pool or BufferPool()).array(name, (store.count(frames), 3), np.float32)
         return points, np.empty((self._n, frames), dtype=np.int64)
 
     def moment_arms(self, frames: int) -> Array:

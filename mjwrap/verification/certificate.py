@@ -17,7 +17,7 @@ import numpy as np
 
 import mjwrap as mw
 from mjwrap.verification.arcs import Arcs, arcs_of
-from mjwrap.verification.shapes import SHAPES, Array, Ints, Shape, beside, half_length, sizes
+from mjwrap.verification.shapes import SHAPES, Array, Ints, Shape, half_length, orthogonal_unit, sizes
 
 ON_SURFACE = 1e-12  # distance of contact points from their surface, a hundred roundings of 0.1 m [m]
 DIRECTION = 1e-8  # sine of the angle between a segment and its geodesic; the solver asks for 1e-10
@@ -172,7 +172,7 @@ def _tangent(n: Array, e: Array) -> Array:
     """Return unit tangents (m, 3) along directions, or any where these are near the normals (m, 3)."""
     t = e - (e * n).sum(1)[:, None] * n
     size = np.linalg.norm(t, axis=1)
-    return np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], beside(n))
+    return np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], orthogonal_unit(n))
 
 
 def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:

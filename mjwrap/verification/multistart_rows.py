@@ -18,7 +18,18 @@ import mjwrap as mw
 from mjwrap.surfaces import Surface
 from mjwrap.verification.certificate import ENTERING, Case, deepest, rotation
 from mjwrap.verification.polish import Touch, polish
-from mjwrap.verification.shapes import SHAPES, Array, Ellipsoid, Ints, Shape, Torus, beside, dot, sizes, unit
+from mjwrap.verification.shapes import (
+    SHAPES,
+    Array,
+    Ellipsoid,
+    Ints,
+    Shape,
+    Torus,
+    dot,
+    orthogonal_unit,
+    sizes,
+    unit,
+)
 
 NODES = 10  # from one obstacle to the next
 PULLS = (
@@ -49,7 +60,7 @@ def ways_round(surface: Surface, quat: Sequence[float], along: Array) -> list[Ar
             reach, count, others = d[0] + d[1], 4, []
         case _:
             reach, count, others = 1.2 * max(d), 4, []
-    first = beside(along)
+    first = orthogonal_unit(along)
     second = np.cross(along, first)
     angles = 2.0 * np.pi * (np.arange(count) + 0.25) / count
     return [*others, *(reach * (np.cos(x) * first + np.sin(x) * second) for x in angles)]

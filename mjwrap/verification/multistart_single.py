@@ -25,8 +25,8 @@ from mjwrap.verification.shapes import (
     Ints,
     Shape,
     Torus,
-    beside,
     dot,
+    orthogonal_unit,
     sizes,
     unit,
 )
@@ -223,7 +223,7 @@ def _polar_circle(a: Array, radius: float, ring: Array) -> Array:
     """Return the circle on which rays from a graze the sphere about the origin."""
     far = np.linalg.norm(a)
     up = a / far
-    side = beside(up)
+    side = orthogonal_unit(up)
     plane = ring @ np.stack([side, np.cross(up, side)])
     return radius**2 / far * up + radius * np.sqrt(1.0 - (radius / far) ** 2) * plane
 

@@ -29,7 +29,7 @@ def unit(a: Array) -> Array:
     return a / np.sqrt(dot(a, a))[..., None]
 
 
-def beside(a: Array) -> Array:
+def orthogonal_unit(a: Array) -> Array:
     """Return some unit vectors at right angles to a (..., 3)."""
     least = np.eye(3)[np.abs(a).argmin(-1)]
     cross: Array = np.cross(a, least)

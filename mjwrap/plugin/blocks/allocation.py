@@ -13,7 +13,7 @@ from collections import OrderedDict
 
 from mjwrap.errors import ModelError
 from mjwrap.plugin.blocks.image import block_image, renew, state_size
-from mjwrap.plugin.blocks.reading import copy_read
+from mjwrap.plugin.blocks.instance_muscles import copy_read
 from mjwrap.plugin.blocks.table import enter_block
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries

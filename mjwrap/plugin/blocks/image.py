@@ -17,8 +17,8 @@ from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
+from mjwrap.plugin.blocks.model_changes import Watch, watch
 from mjwrap.plugin.blocks.transmission_part import transmission_part
-from mjwrap.plugin.blocks.watch import Watch, watch
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing as dr
 from mjwrap.plugin.callbacks import saving
@@ -61,7 +61,7 @@ def _arrays(
     arrays: dict[str, Any] = {name: getattr(plan, name) for name in bk.ARRAYS if hasattr(plan, name)}
     params = np.array(plan.params)
     for m, (muscle, law) in enumerate(zip(muscles, plan.law, strict=True)):
-        if muscle.actuator >= 0 and law == MUJOCO:  # its limits as the marks that `follow.py` compares
+        if muscle.actuator >= 0 and law == MUJOCO:  # its limits as the marks that `sync.py` compares
             limits = limit_marks(model, muscle.actuator)
             params[m, mujoco_muscle.LIMITS : mujoco_muscle.LIMITS + 2] = limits
     arrays |= {

@@ -26,7 +26,7 @@ FIELDS = (
 ) = range(16, 16 + len(FIELDS))  # fmt: skip
 # MuJoCo's codes: the integrator RK4, the bit of `disableflags` that switches actuation off
 RUNGE_KUTTA, NO_ACTUATION = 32, 33
-# what `follow.py` needs: the model last followed, its instance, the function that builds the numbers anew, and how many
+# what `sync.py` needs: the model last followed, its instance, the function that builds the numbers anew, and how many
 # regions it watches
 MODEL, INSTANCE, REBUILD, PLAIN, DERIVED, STRUCTURE, BOUND = 34, 35, 36, 37, 38, 39, 40
 # where the arrays start

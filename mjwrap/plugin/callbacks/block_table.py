@@ -17,7 +17,7 @@ from numba.core import cgutils, types
 
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import half, intrinsic, store_word, word
+from mjwrap.plugin.callbacks.memory import intrinsic, read_int32, read_int64, write_int64
 
 CAPACITY = 1 << 16  # entries
 # words of an entry: address of the mjData or 0, instance, address of its block
@@ -64,21 +64,21 @@ def _owned(place, data, instance):
     if place < 1 or place >= CAPACITY:
         return False
     entry = _entry(place)
-    return word(entry + 8 * OWNER) == data and word(entry + 8 * INSTANCE) == instance
+    return read_int64(entry + 8 * OWNER) == data and read_int64(entry + 8 * INSTANCE) == instance
 
 
 @jit
 def place_of(data, instance, nplugin, plugin_data):
     """Return the place of an instance's entry, 0 where it has none; a slot that was copied is mended."""
-    if instance >= half(data + nplugin):
+    if instance >= read_int32(data + nplugin):
         return 0
-    slot = word(data + plugin_data) + 8 * instance
-    place = word(slot)
+    slot = read_int64(data + plugin_data) + 8 * instance
+    place = read_int64(slot)
     if place == 0 or _owned(place, data, instance):
         return place
-    for other in range(1, word(_table()) + 1):
+    for other in range(1, read_int64(_table()) + 1):
         if _owned(other, data, instance):
-            store_word(slot, other)
+            write_int64(slot, other)
             return other
     return 0
 
@@ -86,23 +86,24 @@ def place_of(data, instance, nplugin, plugin_data):
 @jit
 def block_at(place):
     """Return the address of an entry's block, 0 for no place."""
-    return word(_entry(place) + 8 * BLOCK) if place != 0 else 0
+    return read_int64(_entry(place) + 8 * BLOCK) if place != 0 else 0
 
 
 @jit
 def remove_entry(place):
     """Give an entry back."""
-    store_word(_entry(place) + 8 * OWNER, 0)
+    write_int64(_entry(place) + 8 * OWNER, 0)
 
 
 @jit
 def _keeps(place, instance, state):
     """Return whether an entry is that of the instance whose numbers in plugin_state start at an address."""
     entry = _entry(place)
-    owner, block = word(entry + 8 * OWNER), word(entry + 8 * BLOCK)
-    if owner == 0 or word(entry + 8 * INSTANCE) != instance:
+    owner, block = read_int64(entry + 8 * OWNER), read_int64(entry + 8 * BLOCK)
+    if owner == 0 or read_int64(entry + 8 * INSTANCE) != instance:
         return False
-    return word(owner + word(block + 8 * bk.PLUGIN_STATE)) + 8 * word(block + 8 * bk.STATE_ADDRESS) == state
+    first = read_int64(owner + read_int64(block + 8 * bk.PLUGIN_STATE))
+    return first + 8 * read_int64(block + 8 * bk.STATE_ADDRESS) == state
 
 
 @jit
@@ -110,7 +111,7 @@ def block_of_state(place, instance, state):
     """Return the block of the instance whose numbers start at an address; place: what its slot says."""
     if 1 <= place < CAPACITY and _keeps(place, instance, state):
         return block_at(place)
-    for other in range(1, word(_table()) + 1):
+    for other in range(1, read_int64(_table()) + 1):
         if _keeps(other, instance, state):
             return block_at(other)
     return 0

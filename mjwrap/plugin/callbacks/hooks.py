@@ -19,7 +19,7 @@ from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st
 from mjwrap.plugin.callbacks._cache import callback, jit
 from mjwrap.plugin.callbacks.block_table import block_at, block_of_state, place_of, remove_entry
-from mjwrap.plugin.callbacks.memory import call, call_with_four, store_word, word
+from mjwrap.plugin.callbacks.memory import call, call_with_four, read_int64, write_int64
 
 _WORD, _INT = types.int64, types.int32
 
@@ -84,18 +84,18 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
         place = place_of(data, instance, nplugin, plugin_data)
         if place != 0:
             block = block_at(place)
-            store_word(word(data + plugin_data) + 8 * instance, 0)
+            write_int64(read_int64(data + plugin_data) + 8 * instance, 0)
             remove_entry(place)
-            call(word(block + 8 * bk.FREE), block, 0, 0)
+            call(read_int64(block + 8 * bk.FREE), block, 0, 0)
 
     def copy(target, model, origin, instance):
         to, given = (
             _block(target, instance, nplugin, plugin_data),
             _block(origin, instance, nplugin, plugin_data),
         )
-        if to != 0 and given != 0 and word(to) == word(given):
-            for i in range(word(given) // 8):
-                store_word(to + 8 * i, word(given + 8 * i))
+        if to != 0 and given != 0 and read_int64(to) == read_int64(given):
+            for i in range(read_int64(given) // 8):
+                write_int64(to + 8 * i, read_int64(given + 8 * i))
 
     def reset(model, state, place, instance):
         block = block_of_state(place, instance, state) if place != 0 else 0
@@ -105,17 +105,17 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
     def compute(model, data, instance, capability):
         block = _block(data, instance, nplugin, plugin_data)
         if block != 0:
-            call(word(block + 8 * bk.STAGE), block, model, data)
+            call(read_int64(block + 8 * bk.STAGE), block, model, data)
 
     def advance(model, data, instance):
         block = _block(data, instance, nplugin, plugin_data)
         if block != 0:
-            call(word(block + 8 * bk.FINISH), block, model, data)
+            call(read_int64(block + 8 * bk.FINISH), block, model, data)
 
     def visualize(model, data, option, scene, instance):
         block = _block(data, instance, nplugin, plugin_data)
-        if block != 0 and word(block + 8 * bk.DRAW) != 0:
-            call_with_four(word(block + 8 * bk.DRAW), block, model, option, scene)
+        if block != 0 and read_int64(block + 8 * bk.DRAW) != 0:
+            call_with_four(read_int64(block + 8 * bk.DRAW), block, model, option, scene)
 
     return Hooks(
         callback(types.void(_WORD, _INT), destroy),

@@ -26,11 +26,11 @@ def _load(kind: Any, numba_type: Any) -> Any:
     return intrinsic(typed)
 
 
-word: Any = _load(_WORD, types.int64)  # the 64-bit integer at an address
-half: Any = _load(ir.IntType(32), types.int32)  # the 32-bit integer at an address
-byte: Any = _load(ir.IntType(8), types.uint8)  # the byte at an address
-real: Any = _load(ir.DoubleType(), types.float64)  # the double at an address
-single: Any = _load(ir.FloatType(), types.float32)  # the float at an address
+read_int64: Any = _load(_WORD, types.int64)  # the 64-bit integer at an address
+read_int32: Any = _load(ir.IntType(32), types.int32)  # the 32-bit integer at an address
+read_uint8: Any = _load(ir.IntType(8), types.uint8)  # the byte at an address
+read_float64: Any = _load(ir.DoubleType(), types.float64)  # the double at an address
+read_float32: Any = _load(ir.FloatType(), types.float32)  # the float at an address
 
 
 @intrinsic
@@ -44,7 +44,7 @@ def pointer(typing_context: Any, address: Any) -> Any:
 
 
 @intrinsic
-def store_word(typing_context: Any, address: Any, value: Any) -> Any:
+def write_int64(typing_context: Any, address: Any, value: Any) -> Any:
     """Write a 64-bit integer to an address."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -80,36 +80,36 @@ def call_with_four(
 
 
 @jit
-def reals(address, shape):
+def float64_array(address, shape):
     """Return the doubles at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.float64)
 
 
 @jit
-def words(address, shape):
+def int64_array(address, shape):
     """Return the 64-bit integers at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.int64)
 
 
 @jit
-def halves(address, shape):
+def int32_array(address, shape):
     """Return the 32-bit integers at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.int32)
 
 
 @jit
-def flags(address, shape):
+def bool_array(address, shape):
     """Return the bytes at an address as an array of booleans of the given shape."""
     return carray(pointer(address), shape, np.bool_)
 
 
 @jit
-def singles(address, shape):
+def float32_array(address, shape):
     """Return the floats at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.float32)
 
 
 @jit
-def octets(address, shape):
+def uint8_array(address, shape):
     """Return the bytes at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.uint8)

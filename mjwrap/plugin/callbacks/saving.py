@@ -14,7 +14,7 @@ from mjwrap.kernels.solved import segments as sg
 from mjwrap.kernels.spans.end_inside import has_valid_length
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import reals, word, words
+from mjwrap.plugin.callbacks.memory import float64_array, int64_array, read_int64
 
 PER_MUSCLE = 6
 SAVED = lay.STATE + 4  # of a surface: the solution, then the hint
@@ -22,26 +22,28 @@ SAVED = lay.STATE + 4  # of a surface: the solution, then the hint
 
 @jit
 def floats(block, which, shape):
-    return reals(block + word(block + 8 * which), shape)
+    return float64_array(block + read_int64(block + 8 * which), shape)
 
 
 @jit
 def ints(block, which, shape):
-    return words(block + word(block + 8 * which), shape)
+    return int64_array(block + read_int64(block + 8 * which), shape)
 
 
 @jit
 def state_of(block, data):
     """Return the instance's part of plugin_state."""
-    start = word(data + word(block + 8 * bk.PLUGIN_STATE)) + 8 * word(block + 8 * bk.STATE_ADDRESS)
-    return reals(start, (word(block + 8 * bk.NSTATE),))
+    start = read_int64(data + read_int64(block + 8 * bk.PLUGIN_STATE)) + 8 * read_int64(
+        block + 8 * bk.STATE_ADDRESS
+    )
+    return float64_array(start, (read_int64(block + 8 * bk.NSTATE),))
 
 
 @jit
 def sizes(block):
     """Return the numbers of muscles, nodes, routes and bodies."""
-    n, nodes = word(block + 8 * bk.MUSCLES), word(block + 8 * bk.NODES)
-    return n, nodes, word(block + 8 * bk.ROUTES), word(block + 8 * bk.BODIES)
+    n, nodes = read_int64(block + 8 * bk.MUSCLES), read_int64(block + 8 * bk.NODES)
+    return n, nodes, read_int64(block + 8 * bk.ROUTES), read_int64(block + 8 * bk.BODIES)
 
 
 @jit

@@ -12,7 +12,6 @@ from mjwrap.kernels.musculotendon.dynamics import write_states
 from mjwrap.kernels.musculotendon.groups import Timing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.follow import follow
 from mjwrap.plugin.callbacks.groups import (
     inputs_of,
     muscles_of,
@@ -22,8 +21,9 @@ from mjwrap.plugin.callbacks.groups import (
     start_of,
     states_of,
 )
-from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word
+from mjwrap.plugin.callbacks.memory import bool_array, float64_array, read_float64, read_int32, read_int64
 from mjwrap.plugin.callbacks.saving import floats, ints, load, load_held, save, sizes, state_of
+from mjwrap.plugin.callbacks.sync import sync_with_model
 from mjwrap.plugin.callbacks.transmission import transmit
 
 TOLERANCE = 1e-10  # largest tangency error of a path, as in MuscleSystem
@@ -33,13 +33,13 @@ GROUPS = 31  # actuator groups that options can switch off
 @jit
 def _forces(block, data):
     """Return xfrc_applied and the arrays that `wrenches.put` and `take_back` share."""
-    bodies = word(block + 8 * bk.BODIES)
+    bodies = read_int64(block + 8 * bk.BODIES)
     return (
-        reals(word(data + word(block + 8 * bk.XFRC)), (bodies, 6)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.XFRC)), (bodies, 6)),
         floats(block, bk.A_OTHERS, (bodies, 6)),
         floats(block, bk.A_MINE, (bodies, 6)),
         floats(block, bk.A_TOTAL, (bodies, 6)),
-        flags(block + word(block + 8 * bk.A_WRITTEN), (bodies,)),
+        bool_array(block + read_int64(block + 8 * bk.A_WRITTEN), (bodies,)),
     )
 
 
@@ -47,7 +47,7 @@ def _forces(block, data):
 def _remove_wrenches(block, data, state):
     """Take out of xfrc_applied what this instance put in, or what a restored state says that it had."""
     xfrc, others, mine, total, written = _forces(block, data)
-    loaded = ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
+    loaded = ints(block, bk.A_LOADED, (read_int64(block + 8 * bk.LOADED),))
     at = state.shape[0] - 13 * loaded.shape[0]
     for j in range(loaded.shape[0]):
         b = loaded[j]
@@ -70,7 +70,7 @@ def _add_wrenches(block, data, state, wrench):
     """Put the wrench into xfrc_applied and note in plugin_state what is there now."""
     xfrc, others, mine, total, written = _forces(block, data)
     put(xfrc, others, mine, total, written, wrench)
-    loaded = ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
+    loaded = ints(block, bk.A_LOADED, (read_int64(block + 8 * bk.LOADED),))
     at = state.shape[0] - 13 * loaded.shape[0]
     for j in range(loaded.shape[0]):
         b = loaded[j]
@@ -84,7 +84,7 @@ def _add_wrenches(block, data, state, wrench):
 @jit
 def _erase_paths(block):
     """Leave no path to draw; those that the next evaluation needs are in plugin_state."""
-    count = ints(block, bk.A_COUNT, (word(block + 8 * bk.ROUTES),))
+    count = ints(block, bk.A_COUNT, (read_int64(block + 8 * bk.ROUTES),))
     for c in range(count.shape[0]):
         count[c] = 0
 
@@ -111,24 +111,27 @@ def stage(block, model, data):
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
-    part = block + word(block + 8 * bk.A_TRANSMISSION)
-    transmits = word(part) != 0
-    idle = half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION) != 0
+    part = block + read_int64(block + 8 * bk.A_TRANSMISSION)
+    transmits = read_int64(part) != 0
+    idle = (
+        read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS)) & read_int64(block + 8 * bk.NO_ACTUATION)
+        != 0
+    )
     if idle and not transmits:
         clock[bk.ACTED] = 0.0
         _erase_paths(block)
         return
     n, _, _, bodies = sizes(block)
-    step, since, ahead = real(model + word(block + 8 * bk.TIMESTEP)), 0.0, 0.0
-    if half(model + word(block + 8 * bk.INTEGRATOR)) == word(block + 8 * bk.RUNGE_KUTTA):
-        since = _time_since_start(real(data + word(block + 8 * bk.TIME)), step, state[0], clock)
+    step, since, ahead = read_float64(model + read_int64(block + 8 * bk.TIMESTEP)), 0.0, 0.0
+    if read_int32(model + read_int64(block + 8 * bk.INTEGRATOR)) == read_int64(block + 8 * bk.RUNGE_KUTTA):
+        since = _time_since_start(read_float64(data + read_int64(block + 8 * bk.TIME)), step, state[0], clock)
     else:
         ahead = step
     if since == 0.0:
-        follow(block, model)
+        sync_with_model(block, model)
         load(block, state)
-    off, group = flags(block + word(block + 8 * bk.A_OFF), (n,)), ints(block, bk.A_GROUP, (n,))
-    switched = half(model + word(block + 8 * bk.DISABLEACTUATOR))
+    off, group = bool_array(block + read_int64(block + 8 * bk.A_OFF), (n,)), ints(block, bk.A_GROUP, (n,))
+    switched = read_int32(model + read_int64(block + 8 * bk.DISABLEACTUATOR))
     for m in range(n):
         off[m] = idle or group[m] == bk.SILENT
         off[m] = off[m] or (0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0)
@@ -142,7 +145,7 @@ def stage(block, model, data):
     if failed and since == 0.0:
         load_held(block, state)
         body_wrenches(routes, poses, paths, states.tension, wrench)
-    lost = flags(block + word(block + 8 * bk.A_LOST), (n,))
+    lost = bool_array(block + read_int64(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
         lost[m] = states.status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _add_wrenches(block, data, state, wrench)
@@ -157,21 +160,24 @@ def finish(block, model, data):
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
     clock[bk.FIRST] = -1.0
-    state[0] = real(data + word(block + 8 * bk.TIME))
+    state[0] = read_float64(data + read_int64(block + 8 * bk.TIME))
     if clock[bk.ACTED] == 0.0:
         return
     clock[bk.ACTED] = 0.0
-    n = word(block + 8 * bk.MUSCLES)
+    n = read_int64(block + 8 * bk.MUSCLES)
     write_states(
         ints(block, bk.A_SOURCE, (n,)),
         ints(block, bk.A_INDEX, (n,)),
         floats(block, bk.A_NEXT_ACTIVATION, (n,)),
         floats(block, bk.A_NEXT_FIBER, (n,)),
-        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.ACT)), (read_int64(block + 8 * bk.ACTS),)),
         floats(block, bk.A_OWN, (n, 2)),
     )
     save(block, state)
-    lost, failures = flags(block + word(block + 8 * bk.A_LOST), (n,)), ints(block, bk.A_FAILURES, (n,))
+    lost, failures = (
+        bool_array(block + read_int64(block + 8 * bk.A_LOST), (n,)),
+        ints(block, bk.A_FAILURES, (n,)),
+    )
     for m in range(n):
         if lost[m]:
             failures[m] += 1
@@ -183,7 +189,7 @@ def restart(block, state):
 
     state: address of the instance's numbers in plugin_state, which MuJoCo leaves as they were, or undefined.
     """
-    cold = reals(state, (word(block + 8 * bk.NSTATE),))
+    cold = float64_array(state, (read_int64(block + 8 * bk.NSTATE),))
     for i in range(cold.shape[0]):
         cold[i] = 0.0
     _erase_paths(block)
@@ -191,7 +197,7 @@ def restart(block, state):
     failures = ints(block, bk.A_FAILURES, (n,))
     for m in range(n):
         failures[m] = 0
-    written = flags(block + word(block + 8 * bk.A_WRITTEN), (bodies,))
+    written = bool_array(block + read_int64(block + 8 * bk.A_WRITTEN), (bodies,))
     for b in range(bodies):
         written[b] = False
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))

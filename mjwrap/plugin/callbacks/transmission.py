@@ -12,7 +12,7 @@ from mjwrap.kernels.coupling.groups import Dofs, Transmissions
 from mjwrap.kernels.coupling.moments import write_transmissions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import half, halves, reals, word, words
+from mjwrap.plugin.callbacks.memory import float64_array, int32_array, int64_array, read_int32, read_int64
 
 # sizes; COUNT: of muscles whose actuators pull, 0 where all act by wrenches and nothing else is filled
 COUNT, DOFS, OUTPUTS, MOMENTS, TENDONS, TENDON_MOMENTS, SENSORS, SENSOR_NUMBERS = range(8)
@@ -36,30 +36,30 @@ HEAD = 24 + len(ARRAYS)
 
 @jit
 def _ints(part, which, shape):
-    return words(part + word(part + 8 * which), shape)
+    return int64_array(part + read_int64(part + 8 * which), shape)
 
 
 @jit
 def _floats(part, which, shape):
-    return reals(part + word(part + 8 * which), shape)
+    return float64_array(part + read_int64(part + 8 * which), shape)
 
 
 @jit
 def _field(part, which, owner, shape):
     """Return the array of doubles to which a field of mjData, or mjModel, points."""
-    return reals(word(owner + word(part + 8 * which)), shape)
+    return float64_array(read_int64(owner + read_int64(part + 8 * which)), shape)
 
 
 @jit
 def _indices(part, which, owner, shape):
-    return halves(word(owner + word(part + 8 * which)), shape)
+    return int32_array(read_int64(owner + read_int64(part + 8 * which)), shape)
 
 
 @jit
 def transmit(part, block, model, data, first_stage, routes, poses, paths, states):
     """Write what the actuators of an instance's muscles see; first_stage: sensors, too, show the present state."""
-    n, dofs, outputs = states.length.shape[0], word(part + 8 * DOFS), word(part + 8 * OUTPUTS)
-    entries, tendons = word(part + 8 * MOMENTS), word(part + 8 * TENDONS)
+    n, dofs, outputs = states.length.shape[0], read_int64(part + 8 * DOFS), read_int64(part + 8 * OUTPUTS)
+    entries, tendons = read_int64(part + 8 * MOMENTS), read_int64(part + 8 * TENDONS)
     bodies = poses.body_rootid.shape[0]
     tree = Dofs(
         _ints(part, A_LAST_DOF, (bodies,)),
@@ -81,16 +81,16 @@ def transmit(part, block, model, data, first_stage, routes, poses, paths, states
         _field(part, MOMENT, data, (entries,)),
         _field(part, TEN_LENGTH, data, (tendons,)),
         _field(part, TEN_VELOCITY, data, (tendons,)),
-        _field(part, TEN_J, data, (word(part + 8 * TENDON_MOMENTS),)),
+        _field(part, TEN_J, data, (read_int64(part + 8 * TENDON_MOMENTS),)),
     )
     row = _floats(part, A_ROW, (dofs,))
     write_transmissions(routes, paths, tree, states.length, states.velocity, targets, row)
-    flags = half(model + word(block + 8 * bk.DISABLEFLAGS))
-    if not first_stage or flags & word(part + 8 * NO_SENSORS):
+    flags = read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS))
+    if not first_stage or flags & read_int64(part + 8 * NO_SENSORS):
         return
-    sensors = word(part + 8 * SENSORS)
+    sensors = read_int64(part + 8 * SENSORS)
     sensor, limits = _ints(part, A_SENSOR, (sensors, 3)), _floats(part, A_LIMITS, (sensors, 2))
-    shown = _field(part, SENSORDATA, data, (word(part + 8 * SENSOR_NUMBERS),))
+    shown = _field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
     for k in range(sensors):
         m = sensor[k, 1]
         value = targets.actuator_length[targets.output[m]]

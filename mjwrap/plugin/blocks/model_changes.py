@@ -1,4 +1,4 @@
-"""Lists the regions of an mjModel from which the muscles' arrays were made, for `callbacks/follow.py` to compare.
+"""Lists the regions of an mjModel from which the muscles' arrays were made, for `callbacks/sync.py` to compare.
 
 Where numbers there are changed while the model is in use, the muscles change with them. Changed names and texts count
 for new mjData only, and so do ids and kinds, unless another model is used with the same mjData.
@@ -17,7 +17,7 @@ from mjwrap.kernels.musculotendon.table import MUJOCO
 from mjwrap.mjcf import MuscleDeclaration, Node
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.callbacks import block as bk
-from mjwrap.plugin.callbacks.follow import BIAS, BINDING, CONTROL, DRIVE, POINTERS, REGION
+from mjwrap.plugin.callbacks.sync import BIAS, BINDING, CONTROL, DRIVE, POINTERS, REGION
 from mjwrap.plugin.mujoco_c.fingerprint import buffer_layout
 from mjwrap.plugin.mujoco_c.offsets import check_pointer
 from mjwrap.surfaces.rows import surface_rows
@@ -35,7 +35,7 @@ _STRUCTURE = (
 
 class Watch(NamedTuple):
     """Lists of regions (k, 3), the bytes that they hold now, the rows (k, 5) that copy plain numbers, and what
-    of MuJoCo's laws and controls is followed where the kernels read it, see `callbacks/follow.py`.
+    of MuJoCo's laws and controls is followed where the kernels read it, see `callbacks/sync.py`.
     """
 
     plain: Words

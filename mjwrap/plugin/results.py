@@ -13,7 +13,7 @@ from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import Declarations
-from mjwrap.plugin.blocks.reading import read_instances
+from mjwrap.plugin.blocks.instance_muscles import read_instances
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.readout import block_address, head_of, instances, transmit
 from mjwrap.plugin.spec.configuration import TRANSMISSION, configuration_at

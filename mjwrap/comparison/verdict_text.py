@@ -73,7 +73,7 @@ def _native_faults(summary: MuscleSummary, poses: int, kinds: set[Fault]) -> str
         if fault in kinds:
             at = f" (geom '{geom}')" if geom else ""
             words = fault.words.format(summary.measures[fault, geom])
-            told.append(f"MuJoCo's path is no geodesic at {count} of {poses} poses{at}: {words}")
+            told.append(f"MuJoCo's path is not a geodesic at {count} of {poses} poses{at}: {words}")
     return "; ".join(told)
 
 
@@ -92,7 +92,7 @@ def _own_faults(summary: MuscleSummary) -> str:
             f"at {counted(sides, 'pose')} mjwrap starts on the side of the cylinder that is away from its side site"
         )
     for words, count in summary.own_faults.most_common(3):
-        told.append(f"mjwrap's path is no geodesic at {counted(count, 'pose')}: {words}")
+        told.append(f"mjwrap's path is not a geodesic at {counted(count, 'pose')}: {words}")
     unexplained = summary.counts[Outcome.UNEXPLAINED.name]
     if unexplained:
         length, velocity, arm = summary.agreement

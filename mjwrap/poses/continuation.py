@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.poses.continuity import odd_intervals, refine_jump
+from mjwrap.poses.continuity import jump_candidates, refine_jump
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ Found = tuple[float, float, float]  # where a jump is, in length and in slope
 FINER = 64  # steps in an interval at which something may have jumped
 
 
-class Walk(NamedTuple):
+class SweepTrace(NamedTuple):
     """Places evaluated one after the other: at (T,), length, slope and good (T, n), and the branches there."""
 
     at: Array
@@ -27,18 +27,18 @@ class Walk(NamedTuple):
     good: NDArray[np.bool_]
     branches: list[Array]
 
-    def odd(self, i: int) -> list[tuple[int, float | None]]:
+    def jump_candidates(self, i: int) -> list[tuple[int, float | None]]:
         """Return the intervals at which muscle i changes as a smooth curve would not."""
-        return odd_intervals(self.at, self.length[:, i], self.slope[:, i], self.good[:, i])
+        return jump_candidates(self.at, self.length[:, i], self.slope[:, i], self.good[:, i])
 
 
-class Walker:
+class PathFollower:
     """Takes the muscles of a MuscleSystem from place to place in an mjData of its model."""
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData) -> None:
         self._muscles, self._data = muscles, data
 
-    def come(self, start: Array, goal: Array, steps: int = 20) -> None:
+    def move_to(self, start: Array, goal: Array, steps: int = 20) -> None:
         """Begin afresh at a pose (nq,), and go to another one on the branch that the muscles have there."""
         model, data = self._muscles.model, self._data
         self._muscles.reset(data)
@@ -50,7 +50,7 @@ class Walker:
             data.qpos[:] = qpos
             self._muscles.forward(data)
 
-    def walk(self, place: Place, at: Array, look: Callable[[float], object] | None = None) -> Walk:
+    def trace(self, place: Place, at: Array, look: Callable[[float], object] | None = None) -> SweepTrace:
         """Evaluate places in order, each from the branch of the one before; look: called after each."""
         muscles, data, n = self._muscles, self._data, self._muscles.n
         length, slope = np.zeros((len(at), n)), np.zeros((len(at), n))
@@ -62,44 +62,46 @@ class Walker:
             branches.append(muscles.branch(data))
             if look is not None:
                 look(value)
-        return Walk(at, length, slope, good, branches)
+        return SweepTrace(at, length, slope, good, branches)
 
-    def jumps(self, place: Place, walk: Walk, only: Iterable[int] | None = None) -> list[tuple[int, Found]]:
+    def jumps(
+        self, place: Place, trace: SweepTrace, only: Iterable[int] | None = None
+    ) -> list[tuple[int, Found]]:
         """Return which muscles jump along a walk, and where, by how much in length [m] and slope.
 
         only: the muscles to look at, all if None. What looks like a jump from one place of the walk is looked at again
         in finer steps, as a smooth motion goes: a leap may land on another branch, where two lie side by side.
         """
-        span, found = float(np.ptp(walk.at)), list[tuple[int, Found]]()
-        finer: dict[int, Walk] = {}
+        span, found = float(np.ptp(trace.at)), list[tuple[int, Found]]()
+        finer: dict[int, SweepTrace] = {}
         for i in range(self._muscles.n) if only is None else only:
-            for k, bend in walk.odd(i):
-                if self._refine(place, walk, i, k, bend, span) is None:
+            for k, bend in trace.jump_candidates(i):
+                if self._refine(place, trace, i, k, bend, span) is None:
                     continue
                 if k not in finer:
-                    self._muscles.set_branch(self._data, walk.branches[k])
-                    finer[k] = self.walk(place, np.linspace(walk.at[k], walk.at[k + 1], FINER + 1))
-                for j, turn in finer[k].odd(i):
+                    self._muscles.set_branch(self._data, trace.branches[k])
+                    finer[k] = self.trace(place, np.linspace(trace.at[k], trace.at[k + 1], FINER + 1))
+                for j, turn in finer[k].jump_candidates(i):
                     jump = self._refine(place, finer[k], i, j, turn, span)
                     if jump and all(i != m or abs(jump[0] - other[0]) > 1e-6 * span for m, other in found):
                         found.append((i, jump))
         return found
 
     def _refine(
-        self, place: Place, walk: Walk, i: int, k: int, bend: float | None, span: float
+        self, place: Place, trace: SweepTrace, i: int, k: int, bend: float | None, span: float
     ) -> Found | None:
         def probe(at: float) -> tuple[float, float]:
             self._data.qpos[:], tangent = place(at)
-            self._muscles.set_branch(self._data, walk.branches[k])
+            self._muscles.set_branch(self._data, trace.branches[k])
             jacobian = self._muscles.length_jacobian(self._data)
             return float(self._muscles.length[i]), float(jacobian[i] @ tangent)
 
-        return refine_jump(probe, float(walk.at[k]), float(walk.at[k + 1]), span, bend)
+        return refine_jump(probe, float(trace.at[k]), float(trace.at[k + 1]), span, bend)
 
-    def touched(self, place: Place, walk: Walk, i: int, at: float) -> int:
+    def touched(self, place: Place, trace: SweepTrace, i: int, at: float) -> int:
         """Return how many surfaces muscle i touches at a place, come to in a straight walk from the one before."""
-        k = int(np.searchsorted(walk.at, at)) - 1
-        self._muscles.set_branch(self._data, walk.branches[max(k, 0)])
+        k = int(np.searchsorted(trace.at, at)) - 1
+        self._muscles.set_branch(self._data, trace.branches[max(k, 0)])
         self._data.qpos[:] = place(at)[0]
         self._muscles.forward(self._data)
         return len(self._muscles.contact_points(i))

@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.judge_geodesic import ANGLE, HELD, Fault, judge, judge_held
+from mjwrap.comparison.judge_geodesic import ANGLE, INSIDE_TOLERANCE, Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
+from mjwrap.poses.continuation import PathFollower, SweepTrace
 from mjwrap.poses.joint_sweeps import PoseSequence
-from mjwrap.poses.walking import Walk, Walker
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class _Pair(NamedTuple):
 
 
 @dataclass
-class Twin:
+class MusclePair:
     """One muscle in both programs over a motion.
 
     index: in the `MuscleSystem`; status (T,): mjwrap's. A muscle that stays native has index -1 and no mjwrap.
@@ -72,8 +72,8 @@ class Batch:
     """All compared muscles over one motion; walk: all of mjwrap's."""
 
     motion: PoseSequence
-    walk: Walk
-    twins: list[Twin] = field(default_factory=list)
+    trace: SweepTrace
+    pairs: list[MusclePair] = field(default_factory=list)
 
 
 class Comparer:
@@ -93,7 +93,7 @@ class Comparer:
         self._native_data = mujoco.MjData(self._native)
         mujoco.mj_kinematics(self._native, self._native_data)
         self.data = mujoco.MjData(self.model)
-        self.walker = Walker(muscles, self.data)
+        self.follower = PathFollower(muscles, self.data)
         self.left_out: dict[str, str] = {}
         self._pairs: list[_Pair] = []
         for name in wanted:
@@ -133,7 +133,7 @@ class Comparer:
         branches: list[Array] = []
         self.muscles.reset(self.data)
         if motion.continuous and start is not None:
-            self.walker.come(start, motion.qpos[0])
+            self.follower.move_to(start, motion.qpos[0])
         for k in range(count):
             native.keep(k, *self.native_at(motion.qpos[k], motion.qvel[k]))
             wraps.keep(k, self._native_data)
@@ -144,10 +144,10 @@ class Comparer:
             contacts.append({i: self.muscles.contact_points(i) for i in taken})
             branches.append(self.muscles.branch(self.data))
         slopes = np.einsum("tnv,tv->tn", mine.jacobian, motion.tangent)
-        batch = Batch(motion, Walk(motion.at, mine.length, slopes, mine.status == 0, branches))
+        batch = Batch(motion, SweepTrace(motion.at, mine.length, slopes, mine.status == 0, branches))
         for name, index, tendon, spans in self._pairs:
             points = wraps.points(tendon, spans)
-            record = self._record(spans, points, geoms, HELD, *native.of(tendon))
+            record = self._record(spans, points, geoms, INSIDE_TOLERANCE, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)
             if index >= 0:
                 own = [_own_points(at) for at in points]
@@ -156,7 +156,7 @@ class Comparer:
                     self._record(spans, own, geoms, ANGLE, *mine.of(index)),
                     mine.status[:, index],
                 )
-            batch.twins.append(Twin(name, index, tendon, spans, record, own_record, status))
+            batch.pairs.append(MusclePair(name, index, tendon, spans, record, own_record, status))
         return batch
 
     def native_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array]:
