@@ -374,12 +374,12 @@ def test_what_does_not_pull_has_no_energetics() -> None:
 def test_states_advance_only_after_an_applied_step() -> None:
     model = elastic()
     muscles, data = mw.MuscleSystem(model), start(model)
-    with pytest.raises(mw.StateError, match="nothing to advance"):
+    with pytest.raises(mw.StateError, match="no step to advance"):
         muscles.advance(data)
     muscles.step(data, nstep=3)
     muscles.apply(data)
     mujoco.mj_resetData(model, data)
-    with pytest.raises(mw.StateError, match="nothing to advance"):
+    with pytest.raises(mw.StateError, match="no step to advance"):
         muscles.advance(data)
     assert not data.act.any()
 

@@ -1,4 +1,4 @@
-"""The engine plugin: plain `mj_step`, the viewer, `rollout` and `batch` run the muscles, with no Python in the loop."""
+"""The engine plugin: `mj_step`, the viewer, `rollout` and `batch` run the muscles without Python in the loop."""
 
 from mjwrap.plugin.installing import install, load
 from mjwrap.plugin.native import native

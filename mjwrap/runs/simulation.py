@@ -1,4 +1,4 @@
-"""Running a model: its settings, its start, and the loop over time steps."""
+"""Run a model: settings, start, and the loop over time steps."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
 
-Log = Callable[[mujoco.MjData], object]  # takes the state of a sample
+Log = Callable[[mujoco.MjData], object]  # called with the state of a sample
 
 
 @dataclass(frozen=True)
 class RunSettings:
-    """How a model is run.
+    """The settings of a run.
 
     duration and sample, the time between samples, rounded to whole time steps [s]. timestep [s] and integrator, a name
-    in `INTEGRATORS`: None leaves the model's. mode: what runs the muscles, one of `MODES`. excitation, seed: as
-    `Excitation` takes them. prescribed: joints that follow a motion, as `PrescribedMotion` takes them. keyframe: the
-    name of the start pose, None for qpos0. positions: of single hinges and slides at the start [rad, m]. strict: stop
-    where a muscle's path cannot be found.
+    in `INTEGRATORS`: None keeps the model's. mode: the engine of the muscles, one of `MODES`. excitation, seed: as for
+    `Excitation`. prescribed: joints that follow a motion, as for `PrescribedMotion`. keyframe: the name of the start
+    pose, None for qpos0. positions: start positions of single hinges and slides by name [rad, m]. strict: stop if a
+    muscle's path cannot be found.
     """
 
     duration: float = 1.0
@@ -48,7 +48,7 @@ class RunSettings:
 
 
 class WallTime(NamedTuple):
-    """Wall time [s]: of the simulation, and of sampling, drawing and writing it."""
+    """Wall time [s] of the simulation, and of sampling, drawing and writing."""
 
     simulation: float
     outputs: float
@@ -57,8 +57,8 @@ class WallTime(NamedTuple):
 class Simulation:
     """A model at the start of a run, with its excitation and its prescribed joints.
 
-    source: an MJCF or MJB file, or "myo_sim:NAME". option: what the prescribed joints were given by, for messages.
-    `ModelError` or `SignalError` for settings that do not fit the model.
+    source: an MJCF or MJB file, or "myo_sim:NAME". option: the name of the option for prescribed joints, for messages.
+    Raises `ModelError` or `SignalError` for settings that do not fit the model.
     """
 
     def __init__(self, source: str, settings: RunSettings, *, option: str = "") -> None:
@@ -78,7 +78,7 @@ class Simulation:
 
     @property
     def duration(self) -> float:
-        """The set duration as whole time steps [s]."""
+        """The duration [s], rounded to whole time steps."""
         return self._steps * self._timestep
 
     @property
@@ -90,10 +90,10 @@ class Simulation:
         return max(1, math.ceil(self.settings.duration / self._timestep - 1e-6))
 
     def begin(self) -> None:
-        """Compute all at the start; compiles where that is still to do, before the clock starts.
+        """Evaluate everything at the start, which also compiles the kernels before time is measured.
 
-        `ModelError` for a muscle that would have to hold its last force and has none yet, as an end of it lies inside
-        a surface.
+        Raises `ModelError` if a muscle has no path at the start, because an end lies inside a surface: it has no last
+        valid force to keep.
         """
         self.prescribed.place(self.engine.data)
         self.excitation.write(self.engine.data)
@@ -110,9 +110,9 @@ class Simulation:
         progress: Callable[[float], object] = lambda seconds: None,
         stopped: Callable[[], object] = lambda: False,
     ) -> WallTime:
-        """Run for the set duration, or until `stopped` returns something true; return the time that it took.
+        """Run for the duration, or until `stopped` returns a true value; return the wall time.
 
-        logs: called with the state of every sample, the muscles evaluated at it; also at the end, unless stopped.
+        logs: called with the state of every sample, after the muscles' evaluation; also at the end, unless stopped.
         progress: called at every sample with the simulated time since the last one [s].
         """
         data, timestep, steps = self.engine.data, self._timestep, self._steps
@@ -133,7 +133,7 @@ class Simulation:
         return WallTime(time.perf_counter() - started - outputs, outputs)
 
     def _sample(self, logs: Sequence[Log]) -> float:
-        """Log the present state; return the time [s] that it took."""
+        """Log the present state; return the wall time [s] of this."""
         started = time.perf_counter()
         if logs:
             self.engine.evaluate()
@@ -145,8 +145,8 @@ class Simulation:
 def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = DEFAULT_KINDS) -> Table:
     """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
 
-    source: an MJCF or MJB file, or "myo_sim:NAME". kinds: which numbers the table holds, of `run_table.KINDS`; columns
-    are called KIND:NAME, in SI units. Errors as `Simulation` and its `advance` raise them.
+    source: an MJCF or MJB file, or "myo_sim:NAME". kinds: the quantities in the table, of `run_table.KINDS`; columns
+    are called KIND:NAME, in SI units. Raises the errors of `Simulation` and of its `advance`.
     """
     simulation = Simulation(source, settings or RunSettings())
     table = RunTable(simulation.muscles.model, simulation.muscles, kinds)

@@ -58,7 +58,7 @@ def recompute(
             stack.close()
     span = f"{states.time[0]:g} s to {states.time[done - 1]:g} s"
     without = {
-        name: f"no path at {counted(count, 'state')}; the last time because {muscles.reason(i)}"
+        name: f"no path at {counted(count, 'state')}; last reason: {muscles.reason(i)}"
         for i, (name, count) in enumerate(zip(muscles.names, failures.tolist(), strict=True))
         if count
     }

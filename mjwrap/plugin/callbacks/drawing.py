@@ -1,10 +1,11 @@
-"""Draws muscles as geoms of an mjvScene, which MuJoCo's viewers and its renderer show beside the model.
+"""Draw muscles as geoms of an mjvScene, which MuJoCo's viewers and its renderer show with the model.
 
-A path is drawn as MuJoCo draws a tendon: capsules of the tendon's width, colour, material and group, or those of a new
-tendon where the muscle has none; the default grey gives way to the colour of the muscle's activation. Where actuators
-are shown, the path is drawn once more, wider and in the colour of control or activation. Contact points are spheres.
+A path is drawn as MuJoCo draws a tendon: as capsules with the tendon's width, colour, material and group, or with those
+of a new tendon if the muscle has none. The default grey is replaced by the colour of the muscle's activation. If
+actuators are shown, the path is drawn a second time, wider and in the colour of control or activation. Contact points
+are spheres.
 
-The block is only read: geodesics are evaluated from point to point in a copy of its nodes.
+The block is not changed: geodesics are evaluated from point to point in a copy of its nodes.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from mjwrap.plugin.callbacks.stage import GROUPS as SWITCHES
 
 WIDTH = 0.003  # of a muscle without a tendon [m]: MuJoCo's default
 BEAD = 1.5  # radius of a contact point [widths]
-ROOM = 4096  # points of a path for which there is room at first
+ROOM = 4096  # points of a path for which memory is allocated at first
 GROUPS = 6  # mjNGROUP
 TINY = 1e-15  # mjMINVAL
 LABEL = 100  # bytes of a label
@@ -50,19 +51,19 @@ def _at(block, place):
 
 @jit
 def _shows(block, option, groups, group):
-    """Return whether an option shows the elements of a group, which it clips as MuJoCo does."""
+    """Return whether an option shows the elements of a group; the group is clipped as in MuJoCo."""
     return read_uint8(option + _at(block, groups) + min(max(group, 0), GROUPS - 1)) != 0
 
 
 @jit
 def width_of(width):
-    """Return the width of a tendon as it was written."""
+    """Return the width of a tendon as written in the model, before `hide_tendons`."""
     return width / HIDDEN_FACTOR if width < HIDDEN_BELOW else width
 
 
 @jit
 def _mix(block, model, value, low, high, look):
-    """Write the colour of an actuator at a control, or activation, within its limits, as MuJoCo mixes it."""
+    """Write the colour of an actuator for a control or activation between its limits, by MuJoCo's rule."""
     if low == -math.inf:
         low, high = -1.0, 1.0
     least, middle, most = low, 0.0, high
@@ -83,7 +84,7 @@ def _mix(block, model, value, low, high, look):
 
 @jit
 def _plain(block, look):
-    """Write how a geom without a material reflects light."""
+    """Write the reflection coefficients of a geom without a material."""
     blank = block + _at(block, bk.A_BLANK)
     for i in range(4):
         look[4 + i] = read_float32(blank + _at(block, bk.G_EMISSION + i))
@@ -91,7 +92,7 @@ def _plain(block, look):
 
 @jit
 def _tendon_look(block, model, option, tendon, activation, low, high, look):
-    """Write colour and material of a tendon (-1: none), by the rules of MuJoCo, but for the default grey."""
+    """Write colour and material of a tendon (-1: none) by MuJoCo's rules, except for the default grey."""
     _plain(block, look)
     material, own = -1, False
     if tendon >= 0:
@@ -120,9 +121,9 @@ def _tendon_look(block, model, option, tendon, activation, low, high, look):
 
 @jit
 def _add(block, scene, kind, identity, category, look):
-    """Return the address of a new geom of the scene, all but its shape filled in; 0 where the scene is full.
+    """Return the address of a new geom of the scene with all but its shape filled in; 0 if the scene is full.
 
-    identity: type and id of the element that it belongs to, as segmented images show them.
+    identity: type and id of its element, as in segmented images.
     """
     number = read_int32(scene + _at(block, bk.D_NGEOM))
     if number >= read_int32(scene + _at(block, bk.D_MAXGEOM)):
@@ -153,7 +154,7 @@ def _add(block, scene, kind, identity, category, look):
 
 @jit
 def _stretch(block, geom, ax, ay, az, bx, by, bz, radius):
-    """Give a capsule its shape: between two points, turned from z as little as possible, as mjv_connector does."""
+    """Set the shape of a capsule between two points, turned from z by the shortest way, as by mjv_connector."""
     dx, dy, dz = bx - ax, by - ay, bz - az
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     x, y, z = dx / length, dy / length, dz / length
@@ -210,7 +211,7 @@ def _beads(block, scene, points, count, radius, identity, look):
 
 
 def draw(block, model, option, scene):
-    """Append the muscles of an instance, as they were evaluated last, to the scene that the options ask for."""
+    """Append the muscles of an instance, as last evaluated, to a scene, according to its options."""
     tendons = read_uint8(option + _at(block, bk.D_TENDON)) != 0
     actuators = read_uint8(option + _at(block, bk.D_ACTUATOR)) != 0
     if not tendons and not actuators:

@@ -1,4 +1,4 @@
-"""The kernels' groups of arrays, as they lie in a block, in mjData and in mjModel."""
+"""The kernels' groups of arrays, as views of a block, of mjData and of mjModel."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def start_of(block):
 
 @jit
 def states_of(block):
-    """Return the group of what an evaluation finds."""
+    """Return the group of an evaluation's results."""
     n = read_int64(block + 8 * bk.MUSCLES)
     return MuscleStates(
         floats(block, bk.A_ACTIVATION, (n,)),

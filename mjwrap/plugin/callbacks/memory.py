@@ -1,4 +1,4 @@
-"""Reads and writes memory at addresses in compiled code, and calls functions by their addresses."""
+"""Read and write memory at addresses in compiled code, and call functions by their addresses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numba.np.numpy_support import carray
 from mjwrap.plugin.callbacks._cache import jit
 
 _WORD = ir.IntType(64)
-intrinsic: Any = numba_intrinsic  # what it returns takes other arguments than what it decorates
+intrinsic: Any = numba_intrinsic  # Any: the decorated function takes other arguments than it is written with
 
 
 def _load(kind: Any, numba_type: Any) -> Any:
@@ -35,7 +35,7 @@ read_float32: Any = _load(ir.FloatType(), types.float32)  # the float at an addr
 
 @intrinsic
 def pointer(typing_context: Any, address: Any) -> Any:
-    """Return an address as a pointer of no type."""
+    """Return an address as a void pointer."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], cgutils.voidptr_t)
@@ -55,7 +55,7 @@ def write_int64(typing_context: Any, address: Any, value: Any) -> Any:
 
 
 def _calling(number: int) -> Any:
-    """Return how a function of `number` words is called by its address."""
+    """Return the signature and code generator of a call, by address, of a function of `number` 64-bit integers."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(ir.VoidType(), [_WORD] * number)
@@ -67,7 +67,7 @@ def _calling(number: int) -> Any:
 
 @intrinsic
 def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any) -> Any:
-    """Call void f(word, word, word) by its address."""
+    """Call void f(int64, int64, int64) by its address."""
     return _calling(3)
 
 
@@ -75,7 +75,7 @@ def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any
 def call_with_four(
     typing_context: Any, function: Any, first: Any, second: Any, third: Any, fourth: Any
 ) -> Any:
-    """Call void f(word, word, word, word) by its address."""
+    """Call void f(int64, int64, int64, int64) by its address."""
     return _calling(4)
 
 

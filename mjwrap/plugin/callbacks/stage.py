@@ -1,6 +1,7 @@
-"""Evaluates an instance's muscles inside MuJoCo, and ends a step.
+"""Evaluate an instance's muscles inside MuJoCo, and complete a step.
 
-`stage` and `finish` are compiled in `hooks.py`, as C functions only: another layer would optimise all kernels again.
+`stage` and `finish` are compiled only in `hooks.py`, as C functions: compiled here too, they would optimise all kernels
+a second time.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def _forces(block, data):
 
 @jit
 def _remove_wrenches(block, data, state):
-    """Take out of xfrc_applied what this instance put in, or what a restored state says that it had."""
+    """Remove from xfrc_applied the forces that this instance, or a restored state of it, had added."""
     xfrc, others, mine, total, written = _forces(block, data)
     loaded = ints(block, bk.A_LOADED, (read_int64(block + 8 * bk.LOADED),))
     at = state.shape[0] - 13 * loaded.shape[0]
@@ -67,7 +68,7 @@ def _remove_wrenches(block, data, state):
 
 @jit
 def _add_wrenches(block, data, state, wrench):
-    """Put the wrench into xfrc_applied and note in plugin_state what is there now."""
+    """Add the wrench to xfrc_applied, and store the sum in plugin_state."""
     xfrc, others, mine, total, written = _forces(block, data)
     put(xfrc, others, mine, total, written, wrench)
     loaded = ints(block, bk.A_LOADED, (read_int64(block + 8 * bk.LOADED),))
@@ -83,7 +84,7 @@ def _add_wrenches(block, data, state, wrench):
 
 @jit
 def _erase_paths(block):
-    """Leave no path to draw; those that the next evaluation needs are in plugin_state."""
+    """Erase the paths that are drawn; the next evaluation starts from those in plugin_state."""
     count = ints(block, bk.A_COUNT, (read_int64(block + 8 * bk.ROUTES),))
     for c in range(count.shape[0]):
         count[c] = 0
@@ -91,9 +92,9 @@ def _erase_paths(block):
 
 @jit
 def _time_since_start(time, step, ended, clock):
-    """Return how long ago the step began [s] to which this stage of Runge-Kutta belongs.
+    """Return the time since the start of the step of this Runge-Kutta stage [s].
 
-    A stage's time is computed as the step's start plus half or all of a step, so it is recognised to the bit.
+    A stage's time is the start of the step plus half or all of a step, so it can be compared exactly.
     """
     for start in (ended, clock[bk.FIRST]):
         if time == start:
@@ -107,7 +108,7 @@ def _time_since_start(time, step, ended, clock):
 
 
 def stage(block, model, data):
-    """Evaluate the instance's muscles at the poses and velocities in mjData, and act: by wrenches or transmission."""
+    """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions."""
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
@@ -155,7 +156,7 @@ def stage(block, model, data):
 
 
 def finish(block, model, data):
-    """End a step: leave others' forces in xfrc_applied, keep states and warm starts in plugin_state."""
+    """Complete a step: remove the muscles' forces from xfrc_applied; store states and warm starts in plugin_state."""
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
@@ -185,9 +186,9 @@ def finish(block, model, data):
 
 @jit
 def restart(block, state):
-    """After a reset of mjData, which has cleared xfrc_applied: start cold, with nothing to take back.
+    """Start cold after a reset of mjData, which has cleared xfrc_applied: there are no forces to remove.
 
-    state: address of the instance's numbers in plugin_state, which MuJoCo leaves as they were, or undefined.
+    state: address of the instance's numbers in plugin_state, which a reset does not define.
     """
     cold = float64_array(state, (read_int64(block + 8 * bk.NSTATE),))
     for i in range(cold.shape[0]):

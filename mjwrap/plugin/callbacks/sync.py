@@ -1,12 +1,12 @@
-"""Keeps the muscles' arrays equal to the mjModel: a number changed there counts from the next evaluation on.
+"""Keep the muscles' arrays equal to the mjModel: a changed number takes effect at the next evaluation.
 
-MuJoCo's own muscle law and the limits of controls are compared with the model where the kernels read them, which costs
-no memory but the model's; `drives` says which actuator is whose. Of the rest the block keeps a copy of what the
-muscles' arrays were made from, in lists of regions (offset of the pointer in mjModel, first byte, how many):
+The parameters of MuJoCo's own muscle law and the limits of controls are compared in place, without a copy; `drives`
+gives the actuator of each muscle. For all other numbers the block has a copy of the parts of the model from which the
+muscles' arrays were made, in lists of regions (offset of the pointer in mjModel, first byte, count):
 
-- plain: doubles that stand in the muscles' arrays as they are, copied there by the rows of `bound`;
-- derived: doubles that mean something else there: then Python builds the arrays anew;
-- structure: bytes of ids and kinds, looked at only when another model comes, as in `rollout` over a list of models.
+- plain: doubles that the muscles' arrays contain unchanged; the rows of `bound` copy them;
+- derived: doubles from which the arrays are computed; if one changes, Python computes the arrays again;
+- structure: bytes of ids and kinds, compared only when another model is used, as in `rollout` over a list of models.
 
 `mjwrap/plugin/blocks/model_changes.py` makes the lists.
 """
@@ -27,13 +27,13 @@ from mjwrap.plugin.callbacks.memory import (
     write_int64,
 )
 
-# columns of a list of regions, and of `bound`: as a region, then which array of the block, and which number in it
+# columns of a list of regions; `bound` also has the array of the block, and the number in it
 POINTER, FIRST, COUNT, ARRAY, NUMBER = 0, 1, 2, 3, 4
 REGION, BINDING = 3, 5
-# columns of `drives` (n, 4): a muscle's actuator and its output, -1 where its law is not MuJoCo's; what is followed
+# columns of `drives` (n, 4): a muscle's actuator and its output, -1 if its law is not MuJoCo's; what is compared
 D_ACTUATOR, D_OUTPUT, D_FOLLOWS, DRIVE = 0, 1, 2, 4
-BIAS, CONTROL = 1, 2  # bits: biasprm; the limits of its control
-# `pointers` (6, 2): offsets in mjModel of the pointers to these arrays, and how many numbers they hold
+BIAS, CONTROL = 1, 2  # bits of D_FOLLOWS: biasprm; the limits of its control
+# `pointers` (6, 2): offsets in mjModel of the pointers to these arrays, and the arrays' sizes
 POINTERS = (
     "actuator_gainprm", "actuator_biasprm", "actuator_lengthrange", "actuator_acc0", "actuator_gear",
     "actuator_ctrlrange",
@@ -66,14 +66,14 @@ def _differs(block, which, seen, rows, model):
 
 @jit
 def _living(block, model, which):
-    """Return an array of the model in `pointers`, flat, as words."""
+    """Return a flat array of the model, given by its row in `pointers`, as 64-bit integers."""
     pointers = int64_array(block + read_int64(block + 8 * bk.A_POINTERS), (6, 2))
     return int64_array(read_int64(model + pointers[which, 0]), (pointers[which, 1],))
 
 
 @jit
 def _match(live, at, mine, to, count):
-    """Return in which bits words of two arrays differ."""
+    """Return the bits in which integers of two arrays differ."""
     changes = 0
     for i in range(count):
         changes |= live[at + i] ^ mine[to + i]
@@ -88,9 +88,9 @@ def _copy(live, at, mine, to, count):
 
 @jit
 def _laws(block, model):
-    """Make MuJoCo's muscle laws and the limits of controls the model's.
+    """Copy MuJoCo's muscle laws and the limits of controls from the model, where they differ.
 
-    Limits of force are the marks in gainprm and biasprm (`mjcf/marks.py`). All numbers as words, to the bit.
+    Limits of force are the marks in gainprm and biasprm (`mjcf/marks.py`). All numbers are compared bit by bit.
     """
     n = read_int64(block + 8 * bk.MUSCLES)
     drives = int64_array(block + read_int64(block + 8 * bk.A_DRIVES), (n, DRIVE))
@@ -151,7 +151,7 @@ def _other_structure(block, model):
 
 @jit
 def _note(block, which, seen, rows, size, model):
-    """Keep what the model holds now in a list of regions; size [bytes] of what they count."""
+    """Store the present contents of a list of regions; size: bytes of a number."""
     regions = _table(block, which, rows, REGION)
     at = block + read_int64(block + 8 * seen)
     for r in range(regions.shape[0]):
@@ -165,7 +165,7 @@ def _note(block, which, seen, rows, size, model):
 
 @jit
 def _bind(block, model):
-    """Copy the plain numbers of the model to where the kernels read them."""
+    """Copy the plain numbers of the model to the muscles' arrays."""
     bound = _table(block, bk.A_BOUND, bk.BOUND, BINDING)
     for r in range(bound.shape[0]):
         count = bound[r, COUNT]
@@ -179,7 +179,7 @@ def _bind(block, model):
 
 @jit
 def sync_with_model(block, model):
-    """Make the muscles' arrays those of the model as it is now."""
+    """Update the muscles' arrays to the present model."""
     other = read_int64(block + 8 * bk.MODEL) != model
     _laws(block, model)
     plain = _differs(block, bk.A_PLAIN, bk.A_PLAIN_SEEN, bk.PLAIN, model)
