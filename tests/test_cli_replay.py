@@ -50,7 +50,7 @@ def test_replay_prints_what_a_recording_holds(model: mujoco.MjModel, tmp_path: P
         ("empty", "not a complete recording"),
         ("text", "not a complete recording"),
         ("cut", "not a complete recording"),
-        ("no end", "cut short"),
+        ("no end", "is incomplete"),
         ("scratched", "not a complete recording"),
     ],
 )
