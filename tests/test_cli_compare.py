@@ -161,7 +161,7 @@ def test_check_fails_where_mjwrap_is_wrong(
     assert compare(capsys, *options).code == 0
     ran = compare(capsys, *options, "--check")
     assert ran.code == 1
-    assert "muscle: MuJoCo: at 10 poses both are judged the same geodesic, but differ" in ran.out
+    assert "muscle: MuJoCo: at 10 poses both are judged to be the same geodesic, but differ" in ran.out
 
 
 @pytest.mark.parametrize(

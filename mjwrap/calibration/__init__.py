@@ -1,4 +1,4 @@
-"""Muscle parameters from data: length ranges, fibres and tendons that fit them, and implausible parameters."""
+"""Muscle parameters: length ranges, fibres and tendons that fit them, and implausible parameters."""
 
 from mjwrap.calibration.fibers import (
     MUJOCO_RANGE,

@@ -1,6 +1,6 @@
-"""MuJoCo's own tendons and mjwrap's paths, side by side: the same poses, the same motion, and which path is correct.
+"""Compare MuJoCo's own tendons with mjwrap's paths: at the same poses, in the same motion, and which one is correct.
 
-`compare_poses` sweeps every joint and draws random poses; `compare_motion` runs both forward. Every path is judged by
+`compare_poses` sweeps every joint and draws random poses; `compare_motion` simulates both. Every path is judged by
 its geometry (`judge_geodesic.judge`), independently of both programs.
 """
 

@@ -1,4 +1,4 @@
-"""Jumps of length or slope of both programs along a sweep."""
+"""Find the jumps of length or slope of both programs along a sweep."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Jump:
 
     Attributes:
         program: "MuJoCo" or "mjwrap".
-        muscle: its name.
-        sweep: what was swept.
+        muscle: name of the muscle.
+        sweep: the joint that was swept.
         at: value of the joint at the jump [rad or m].
         length: change of length [m].
         slope: change of slope [m/rad or m/m].
@@ -30,7 +30,7 @@ class Jump:
         after: the path after the jump, in words.
         base: number of the pose around which the joint was swept.
         other_smooth: whether the other program had a path there that did not jump.
-        alone: whether the joint is coupled to another one, so that no motion leads there.
+        alone: whether a coupled joint was moved alone, which no motion of the model does.
     """
 
     program: str
@@ -47,12 +47,12 @@ class Jump:
 
     @property
     def where(self) -> str:
-        """Where it is, with a star where the joint was moved alone."""
+        """The place of the jump as text, with a star if the joint was moved alone."""
         return f"{self.sweep}{' *' * self.alone} = {self.at:.6f}"
 
 
 def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, axis: int = 0) -> list[Jump]:
-    """Return the jumps of both programs along a sweep of one joint that has been evaluated."""
+    """Return the jumps of both programs along an evaluated sweep of one joint."""
     motion, place = batch.motion, poses.maker(joint, axis)
     span, found = float(np.ptp(motion.at)), list[Jump]()
     mine = [pair.index for pair in batch.pairs if pair.mjwrap is not None]
@@ -68,7 +68,7 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
 
 
 def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
-    """Note whether the other program was smooth where this one jumps."""
+    """Set whether the other program is smooth at a jump."""
     (pair,) = (pair for pair in batch.pairs if pair.name == jump.muscle)
     k = int(np.clip(np.searchsorted(batch.motion.at, jump.at), 1, len(batch.motion.at) - 1))
     jumps_too = any(
@@ -80,7 +80,7 @@ def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
 
 
 def _native_jumps(comparer: Comparer, pair: MusclePair, place: Place, motion: PoseSequence) -> list[Found]:
-    """Return the jumps of MuJoCo's tendon, whose path depends on the pose alone."""
+    """Return the jumps of MuJoCo's tendon, whose path depends only on the pose."""
 
     def probe(at: float) -> tuple[float, float]:
         qpos, tangent = place(at)
@@ -110,7 +110,7 @@ def _sides(
     at: float,
     span: float,
 ) -> tuple[str, str]:
-    """Say what the path was on either side of a jump."""
+    """Describe the path on either side of a jump."""
     ends = [place(at - 2.0 * NARROW * span), place(at + 2.0 * NARROW * span)]
     qpos, tangent = (np.array(part) for part in zip(*ends, strict=True))
     motion = PoseSequence("", np.arange(2.0), qpos, tangent, np.zeros_like(tangent), False)
@@ -123,7 +123,7 @@ def _sides(
 
 
 def _words(record: PathRecord, k: int) -> str:
-    """Say what a path is at pose k: which surfaces it touches, and whether it is a true geodesic."""
+    """Describe a path at pose k: the surfaces that it touches, and whether it is a true geodesic."""
     touched = int(record.touched[k].sum())
     text = f"{counted(touched, 'surface')} touched" if touched else "straight"
     if record.fault[k]:

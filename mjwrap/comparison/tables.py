@@ -1,4 +1,4 @@
-"""Lengths and moment arms from another program, beside MuJoCo's and mjwrap's at the same poses.
+"""Compare lengths and moment arms from another program with those of MuJoCo and mjwrap at the same poses.
 
 OpenSim's MuscleAnalysis writes such tables: lengths of all muscles over time, and moment arms about one coordinate in
 each file. Models of the same person in two programs seldom have the same zero of length, so the difference is
@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TableDifference:
-    """How far one program is from a table, for one muscle: program minus table, over all rows where it has a path.
+    """The difference of one program from a table for one muscle: program minus table, over all rows with a path.
 
     Attributes:
-        muscle: its name.
+        muscle: name of the muscle.
         program: "MuJoCo" or "mjwrap".
         quantity: "length" [m] or "moment arm" [m].
         about: the joint of the moment arm, or "".
@@ -38,9 +38,9 @@ class TableDifference:
         rms: root mean square of the difference [m].
         spread: root mean square about the mean [m].
         largest: largest difference [m].
-        time: its time [s].
-        value: the program's value there [m].
-        table: the table's value there [m].
+        time: time of the largest difference [s].
+        value: the program's value at this time [m].
+        table: the table's value at this time [m].
     """
 
     muscle: str
@@ -58,7 +58,7 @@ class TableDifference:
 
 
 class TableColumn(NamedTuple):
-    """A column of a table, and what both programs have there, (T,) each: nan where one has no path.
+    """A column of a table, and the values of both programs, (T,) each: nan where a program has no path.
 
     about: the joint of the moment arms [m], or "" for lengths [m].
     """
@@ -84,7 +84,7 @@ def compare_tables(
 
     A column belongs to the muscle of its name; a path before the name and the prefixes of `mjwrap run --columns` are
     ignored. Values of a table are compared at its own times, at poses that are interpolated linearly in the motion. A
-    tendon that only holds a place for another route is not compared.
+    tendon that is only a placeholder for another route is not compared.
 
     Args:
         model: the model.

@@ -1,4 +1,4 @@
-"""Verdicts on the paths of both programs, pose by pose, collected for each muscle."""
+"""The outcome of the comparison at each pose, and a summary for each muscle."""
 
 from __future__ import annotations
 
@@ -17,22 +17,20 @@ from mjwrap.paths import Status
 from mjwrap.poses.joint_sweeps import PoseSequence
 
 Array = NDArray[np.float64]
-AGREE = 1e-9  # [m, m/s, m/rad] two true geodesics on one branch agree to this
-INSIDE_TOLERANCE = (
-    1e-6  # [m, m/s, m/rad] the same where a string is held inside: MuJoCo finds its corner to 1e-6 rad
-)
+AGREE = 1e-9  # [m, m/s, m/rad] largest difference of two true geodesics on the same branch
+INSIDE_TOLERANCE = 1e-6  # the same if a string is held inside: MuJoCo finds its corner to 1e-6 rad
 
 
 class Outcome(enum.IntEnum):
-    """What comparing one muscle at one pose showed."""
+    """The outcome of the comparison of one muscle at one pose."""
 
     AGREE = 0  # both are the same true geodesic
-    OTHER_BRANCH = 1  # both are true geodesics, round the cylinder another way
+    OTHER_BRANCH = 1  # both are true geodesics, but go round the cylinder in different ways
     MUJOCO_NOT_GEODESIC = 2  # mjwrap's path is a true geodesic, MuJoCo's is not
-    NO_PATH = 3  # mjwrap found none, and MuJoCo's is not a geodesic either
-    MJWRAP_FAILED = 4  # mjwrap found none where MuJoCo's path is a true geodesic
+    NO_PATH = 3  # mjwrap found no path, and MuJoCo's is not a geodesic either
+    MJWRAP_FAILED = 4  # mjwrap found no path, but MuJoCo's is a true geodesic
     MJWRAP_WRONG = 5  # mjwrap's path is not a true geodesic
-    UNEXPLAINED = 6  # both are judged the same true geodesic, and their numbers differ
+    UNEXPLAINED = 6  # both are judged to be the same true geodesic, but their numbers differ
     WRONG_SIDE = (
         7  # from a cold start mjwrap passes a cylinder on the side away from its hint, MuJoCo does not
     )
@@ -42,7 +40,7 @@ MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAI
 
 
 def outcomes(pair: MusclePair, continuous: bool) -> NDArray[np.int64]:
-    """Return the `Outcome` (T,) of a muscle that both programs have; continuous: whether mjwrap keeps its branch."""
+    """Return the `Outcome` (T,) of a muscle in both programs; continuous: whether mjwrap keeps its branch."""
     native, mine = pair.native, pair.mjwrap
     assert mine is not None
     count = len(native.length)
@@ -50,7 +48,7 @@ def outcomes(pair: MusclePair, continuous: bool) -> NDArray[np.int64]:
     held = (native.touched & [span.inside for span in pair.spans]).any(axis=1)
     near = differences(native, mine).max(axis=0) <= np.where(held, INSIDE_TOLERANCE, AGREE)
     found = np.full(count, Outcome.UNEXPLAINED, dtype=np.int64)
-    for here, outcome in (  # the last that holds counts
+    for here, outcome in (  # the last outcome that applies is used
         (near & same, Outcome.AGREE),
         (~same, Outcome.OTHER_BRANCH),
         (~same & (not continuous) & (native.hinted & ~mine.hinted).any(axis=1), Outcome.WRONG_SIDE),
@@ -71,7 +69,7 @@ def differences(native: PathRecord, mine: PathRecord) -> Array:
 
 @dataclass
 class Extreme:
-    """The largest difference of one quantity, and where: motion, place in it, joint values, both programs' numbers."""
+    """The largest difference of one quantity: its motion, place, joint positions, and both programs' numbers."""
 
     difference: float = 0.0
     motion: str = ""
@@ -84,7 +82,7 @@ class Extreme:
 
 @dataclass
 class Curves:
-    """One sweep of one muscle, for a plot: at, and length and slope of both programs (T,)."""
+    """One sweep of one muscle for a plot: at, and length and slope of both programs, (T,) each."""
 
     motion: str
     at: Array
@@ -98,11 +96,13 @@ class Curves:
 
 @dataclass
 class MuscleSummary:
-    """What all poses showed of one muscle.
+    """The results of all poses for one muscle.
 
-    native_only: why it stays native, or empty; counts: poses by `Outcome` name; faults: MuJoCo's faults by (fault,
-    geom), with the largest measure; statuses: mjwrap's failures by message; agreement (3,): the largest differences at
-    poses where both are the same true geodesic; length, velocity, moment_arm: the largest differences of all.
+    native_only: why it stays with MuJoCo, or empty; counts: poses by `Outcome` name; faults: MuJoCo's faults by (fault,
+    geom); measures: their largest measures; own_faults, statuses: mjwrap's faults and failures by message; agreement
+    (3,): the largest differences at poses where both are the same true geodesic; length, velocity, moment_arm: the
+    largest differences of all poses; longer_branch [m]: mjwrap minus MuJoCo where they are on different branches, of
+    the largest size.
     """
 
     name: str
@@ -124,7 +124,7 @@ class MuscleSummary:
     bad_poses: list[tuple[str, str, float, dict[str, float]]] = field(default_factory=list)
 
     def add(self, model: mujoco.MjModel, motion: PoseSequence, pair: MusclePair) -> None:
-        """Take in one motion."""
+        """Add the results of one motion."""
         native, mine = pair.native, pair.mjwrap
         self.poses += len(motion.at)
         for k in np.flatnonzero(native.fault):
@@ -183,7 +183,7 @@ class MuscleSummary:
             setattr(self, name, Extreme(float(gaps[row, k]), *where, float(theirs), float(ours), dof))
 
     def _keep_curves(self, motion: PoseSequence, pair: MusclePair, gap: float) -> None:
-        """Keep the sweep that shows most: the largest difference, else the largest change of length."""
+        """Keep the sweep with the largest difference or, without differences, the largest change of length."""
         if not motion.continuous:
             return
         change = float(np.ptp(pair.native.length))
@@ -202,7 +202,7 @@ class MuscleSummary:
 
     @property
     def at_fault(self) -> int:
-        """Number of poses at which mjwrap, not MuJoCo, is wrong or without an answer."""
+        """Number of poses at which mjwrap is wrong, or has no path although MuJoCo's is a true geodesic."""
         return sum(self.counts[outcome.name] for outcome in MJWRAP_AT_FAULT)
 
 

@@ -1,4 +1,4 @@
-"""Takes muscles through a sweep as a smooth motion would, each pose from the path of the one before; finds jumps."""
+"""Continuation of paths along a sweep, each pose starting from the path at the previous one; finds jumps."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from mjwrap.poses.continuity import jump_candidates, refine_jump
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
-Place = Callable[[float], tuple[Array, Array]]  # where a joint is -> pose (nq,), its derivative (nv,)
-Found = tuple[float, float, float]  # where a jump is, in length and in slope
-FINER = 64  # steps in an interval at which something may have jumped
+Place = Callable[[float], tuple[Array, Array]]  # position of a joint -> pose (nq,), its derivative (nv,)
+Found = tuple[float, float, float]  # position of a jump, its size in length and in slope
+FINER = 64  # number of steps into which an interval with a possible jump is divided
 
 
 class SweepTrace(NamedTuple):
@@ -28,18 +28,18 @@ class SweepTrace(NamedTuple):
     branches: list[Array]
 
     def jump_candidates(self, i: int) -> list[tuple[int, float | None]]:
-        """Return the intervals at which muscle i changes as a smooth curve would not."""
+        """Return the intervals in which muscle i may jump: it changes more than a smooth curve."""
         return jump_candidates(self.at, self.length[:, i], self.slope[:, i], self.good[:, i])
 
 
 class PathFollower:
-    """Takes the muscles of a MuscleSystem from place to place in an mjData of its model."""
+    """Follow the paths of a MuscleSystem from pose to pose, in an mjData of its model."""
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData) -> None:
         self._muscles, self._data = muscles, data
 
     def move_to(self, start: Array, goal: Array, steps: int = 20) -> None:
-        """Begin afresh at a pose (nq,), and go to another one on the branch that the muscles have there."""
+        """Start cold at a pose (nq,), and move to another pose in small steps, on the branches of the first one."""
         model, data = self._muscles.model, self._data
         self._muscles.reset(data)
         difference = np.zeros(model.nv)
@@ -51,7 +51,7 @@ class PathFollower:
             self._muscles.forward(data)
 
     def trace(self, place: Place, at: Array, look: Callable[[float], object] | None = None) -> SweepTrace:
-        """Evaluate places in order, each from the branch of the one before; look: called after each."""
+        """Evaluate positions in order, each from the branch of the previous one; look: called after each."""
         muscles, data, n = self._muscles, self._data, self._muscles.n
         length, slope = np.zeros((len(at), n)), np.zeros((len(at), n))
         good, branches = np.zeros((len(at), n), dtype=np.bool_), []
@@ -67,10 +67,10 @@ class PathFollower:
     def jumps(
         self, place: Place, trace: SweepTrace, only: Iterable[int] | None = None
     ) -> list[tuple[int, Found]]:
-        """Return which muscles jump along a walk, and where, by how much in length [m] and slope.
+        """Return the jumps along a trace: muscle, and position, size in length [m] and size in slope.
 
-        only: the muscles to look at, all if None. What looks like a jump from one place of the walk is looked at again
-        in finer steps, as a smooth motion goes: a leap may land on another branch, where two lie side by side.
+        only: the muscles to test, all if None. A possible jump is tested again in finer steps, as in a smooth motion: a
+        large step may end on another branch where two branches are close to each other.
         """
         span, found = float(np.ptp(trace.at)), list[tuple[int, Found]]()
         finer: dict[int, SweepTrace] = {}
@@ -99,7 +99,7 @@ class PathFollower:
         return refine_jump(probe, float(trace.at[k]), float(trace.at[k + 1]), span, bend)
 
     def touched(self, place: Place, trace: SweepTrace, i: int, at: float) -> int:
-        """Return how many surfaces muscle i touches at a place, come to in a straight walk from the one before."""
+        """Return the number of surfaces that muscle i touches at a position, starting from the trace."""
         k = int(np.searchsorted(trace.at, at)) - 1
         self._muscles.set_branch(self._data, trace.branches[max(k, 0)])
         self._data.qpos[:] = place(at)[0]
