@@ -196,7 +196,7 @@ def test_a_class_of_an_unknown_kind_is_refused() -> None:
         dims = (0.1,)  # pyright: ignore
 
     for surface in (Own(0.1), Nothing()):
-        with pytest.raises(GeometryError, match="the kernels know no surface of kind"):
+        with pytest.raises(GeometryError, match="the kernels have no surface of kind"):
             mw.solve_path((-0.2, 0.0, 0.0), (0.2, 0.0, 0.0), [mw.Obstacle(surface)])
 
 
@@ -269,7 +269,7 @@ def test_a_law_of_an_unknown_code_is_refused() -> None:
     class Own(mw.DeGrooteFregly2016):
         code: ClassVar[int] = UNKNOWN_CODE
 
-    with pytest.raises(ModelError, match="the kernels know no law of code 77"):
+    with pytest.raises(ModelError, match="the kernels have no law of code 77"):
         mw.simulate_muscle(Own(**SIZES_OF_A_MUSCLE), [0.0, 0.1], 0.2, activation=0.5)  # pyright: ignore
 
 

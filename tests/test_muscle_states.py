@@ -269,10 +269,10 @@ WRONG = {
     "no place for a fibre": (MUSCLE, {"tendon_model": "elastic"}, {}, "dyntype='user' actdim='2'"),
     "no such tendon": (HOLDER, {"tendon_model": "stretchy"}, {}, "rigid, elastic"),
     "no such dynamics": (HOLDER, {"activation_dynamics": "fast"}, {}, "there are: zajac, degroote_fregly_2016"),
-    "dynamics of the actuator": (MUSCLE, {"activation_dynamics": "zajac"}, {}, "its actuator's own dynamics"),
+    "dynamics of the actuator": (MUSCLE, {"activation_dynamics": "zajac"}, {}, "the dynamics of its actuator"),
     "smoothing": (HOLDER, {}, {"activation_smoothing": 0.0}, "smoothing must be finite and positive"),
     "limited states": (
-        HOLDER.replace("actdim", 'actlimited="true" actrange="0 1" actdim'), {}, {}, "would clamp the fibre"
+        HOLDER.replace("actdim", 'actlimited="true" actrange="0 1" actdim'), {}, {}, "would limit the fibre"
     ),
 }  # fmt: skip
 
