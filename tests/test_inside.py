@@ -171,7 +171,7 @@ def test_it_stands_between_fixed_points() -> None:
     "surface", [mw.Ellipsoid((0.1, 0.1, 0.1)), mw.Cylinder(0.1, 1.0), mw.Torus(0.2, 0.1)]
 )
 def test_other_surfaces_cannot_hold(surface: mw.Ellipsoid | mw.Cylinder | mw.Torus) -> None:
-    with pytest.raises(mw.GeometryError, match="only a Sphere or a Cylinder without ends"):
+    with pytest.raises(mw.GeometryError, match="only a Sphere or an infinite Cylinder"):
         mw.Obstacle(surface, inside=True)
 
 

@@ -274,12 +274,12 @@ SCENE: Any = (ORIGIN, INSERTION, [mw.Cylinder(0.01)], np.zeros((1, 3)), np.eye(3
 @pytest.mark.parametrize(
     ("method", "options", "message"),
     [
-        ("newton", {}, "method 'newton' is none of: nr, bfgs, broyden"),
+        ("newton", {}, "method must be one of nr, bfgs, broyden, not 'newton'"),
         ("nr", {"step": 1.0}, "has no option 'step'; options: lam, max_iterations, residual"),
         ("nr", {"lam": -0.1}, "lam must be a finite positive number, not -0.1"),
         ("bfgs", {"step": "line_search"}, "step must be 'armijo' or a finite positive number"),
         ("broyden", {"sigma1": math.nan}, "sigma1 must be a finite positive number, not nan"),
-        ("broyden", {"residual": "h"}, "residual 'h' is none of: tangency, normals_binormals"),
+        ("broyden", {"residual": "h"}, "residual must be one of tangency, normals_binormals, not 'h'"),
     ],
 )
 def test_a_wrong_option_is_named(method: str, options: dict[str, Any], message: str) -> None:
