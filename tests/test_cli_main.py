@@ -137,7 +137,9 @@ def mujoco_names(path: str) -> list[str]:
 def test_inspect_says_mistakes_before_anything_else(capsys: pytest.CaptureFixture[str]) -> None:
     ran = inspect(capsys, ELBOW, "--range", "knee=0,1")
     assert (ran.code, ran.out) == (2, "")
-    assert said(ran) == ["mjwrap inspect: there is no joint 'knee' for which a range is given; joints: elbow_flexion"]
+    assert said(ran) == [
+        "mjwrap inspect: there is no joint 'knee' for which a range is given; joints: elbow_flexion"
+    ]
 
 
 def test_files_are_written_where_nobody_reads_standard_output(tmp_path: Path) -> None:

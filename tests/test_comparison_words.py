@@ -1,4 +1,4 @@
-"""What a comparison says: which is right in motion, jumps without a jump of length, and nothing as 0."""
+"""Texts of a comparison: verdicts in motion, jumps of the moment arm alone, and differences of zero."""
 
 from collections import Counter
 

@@ -1,4 +1,4 @@
-"""What cannot be a surface is refused, by name and with advice."""
+"""User functions that cannot be a surface are refused, with their name and with advice."""
 
 from __future__ import annotations
 

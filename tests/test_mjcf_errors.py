@@ -285,7 +285,10 @@ UNFIT = {
         '<general name="extensor" tendon="extensor" dyntype="user" actdim="1" actearly="true"/>',
         "it has actearly, and its dynamics are not",
     ),
-    "delay": ('<motor name="extensor" tendon="extensor" delay="0.01" nsample="8"/>', "its control has a delay"),
+    "delay": (
+        '<motor name="extensor" tendon="extensor" delay="0.01" nsample="8"/>',
+        "its control has a delay",
+    ),
 }
 
 

@@ -1,4 +1,4 @@
-"""What MuscleSystem does where a path cannot be found, and where a state is not finite."""
+"""MuscleSystem if a path cannot be found, and if a state is not finite."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Test a model: tangency, derivatives, forces, energy, continuity. Prints pass or fail, the worst error and its place.
+"""Test a model: tangency, derivatives, forces, energy, jumps. Prints pass or fail, the worst error and its location.
 
 MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
 

@@ -25,11 +25,18 @@ def control_names(model: Any) -> list[str]:
 class Excitation:
     """Signals for the muscles and other actuators of a model.
 
-    entries: patterns and tables; a later entry overrides earlier ones. A pattern ("sine:0.3,1,0.4") is for all muscles;
-    NAME=PATTERN for the muscles and actuators whose names match NAME (`*` and `?` match any characters); the name of a
-    table (.csv, .sto, .mot, .npz) for the muscles and actuators that its columns name (`match_columns`). seed: of the
-    pattern `random`. Actuators that no entry names keep their control. Raises `SignalError` for an entry that is not
-    valid or matches no muscle or actuator.
+    Actuators that no entry names keep their control.
+
+    Args:
+        muscles: the muscles.
+        entries: patterns and tables; a later entry overrides earlier ones. A pattern ("sine:0.3,1,0.4") is for all
+            muscles; NAME=PATTERN for the muscles and actuators whose names match NAME (`*` and `?` match any
+            characters); the name of a table (.csv, .sto, .mot, .npz) for the muscles and actuators that its columns
+            name (`match_columns`).
+        seed: seed of the pattern `random`.
+
+    Raises:
+        SignalError: an entry is not valid, or matches no muscle or actuator.
     """
 
     def __init__(self, muscles: MuscleSystem, entries: Sequence[str], seed: int = 0) -> None:

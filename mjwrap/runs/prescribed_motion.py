@@ -49,10 +49,15 @@ class Spline:
 class PrescribedMotion:
     """The prescribed joints of a run.
 
-    entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
-    column for each joint. Positions in rad or m, or in degrees if the table's header says so. The joints' armature is
-    changed in `model`. option: the name of the option that gave the entries, for messages. Raises `SignalError` or
-    `ModelError` for an entry that cannot be used.
+    Args:
+        model: the model, in which the armature of these joints is changed.
+        entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
+            column for each joint. Positions are in rad or m, or in degrees if the table's header says so.
+        option: name of the command-line option of the entries, for messages.
+
+    Raises:
+        SignalError: an entry is not valid.
+        ModelError: a joint does not exist.
     """
 
     def __init__(self, model: mujoco.MjModel, entries: Sequence[str], *, option: str = "") -> None:

@@ -27,11 +27,18 @@ Log = Callable[[mujoco.MjData], object]  # called with the state of a sample
 class RunSettings:
     """The settings of a run.
 
-    duration and sample, the time between samples, rounded to whole time steps [s]. timestep [s] and integrator, a name
-    in `INTEGRATORS`: None keeps the model's. mode: the engine of the muscles, one of `MODES`. excitation, seed: as for
-    `Excitation`. prescribed: joints that follow a motion, as for `PrescribedMotion`. keyframe: the name of the start
-    pose, None for qpos0. positions: start positions of single hinges and slides by name [rad, m]. strict: stop if a
-    muscle's path cannot be found.
+    Args:
+        duration: simulated time [s], rounded to whole time steps.
+        sample: time between samples [s], rounded to whole time steps.
+        timestep: time step [s]; None for the model's.
+        integrator: "euler", "rk4", "implicit" or "implicitfast"; None for the model's.
+        mode: "python" for a `MuscleSystem`; "wrench" or "transmission" for the engine plugin in this mode.
+        excitation: entries as for `Excitation`.
+        seed: seed of the excitation pattern `random`.
+        prescribed: joints that follow a motion, as for `PrescribedMotion`.
+        keyframe: name of the keyframe of the start; None for qpos0.
+        positions: start positions of hinges and slides by name [rad, m].
+        strict: raise `PathError` if a muscle's path cannot be found.
     """
 
     duration: float = 1.0
@@ -57,8 +64,17 @@ class WallTime(NamedTuple):
 class Simulation:
     """A model at the start of a run, with its excitation and its prescribed joints.
 
-    source: an MJCF or MJB file, or "myo_sim:NAME". option: the name of the option for prescribed joints, for messages.
-    Raises `ModelError` or `SignalError` for settings that do not fit the model.
+    Call `begin`, then `advance`. `engine.model` and `engine.data` are the simulated model and its data; `muscles` has
+    the results at the last sample.
+
+    Args:
+        source: an MJCF or MJB file, or "myo_sim:NAME".
+        settings: the settings of the run.
+        option: name of the command-line option for prescribed joints, for messages.
+
+    Raises:
+        ModelError: the model cannot be loaded, or a setting does not fit it.
+        SignalError: an entry of the excitation or of the prescribed joints is not valid.
     """
 
     def __init__(self, source: str, settings: RunSettings, *, option: str = "") -> None:
@@ -110,10 +126,19 @@ class Simulation:
         progress: Callable[[float], object] = lambda seconds: None,
         stopped: Callable[[], object] = lambda: False,
     ) -> WallTime:
-        """Run for the duration, or until `stopped` returns a true value; return the wall time.
+        """Run for the duration, or until `stopped` returns a true value.
 
-        logs: called with the state of every sample, after the muscles' evaluation; also at the end, unless stopped.
-        progress: called at every sample with the simulated time since the last one [s].
+        Args:
+            logs: called with the data of every sample, after the muscles' evaluation; also at the end, unless stopped.
+            progress: called at every sample with the simulated time since the last one [s].
+            stopped: called before every step; a true value ends the run.
+
+        Returns:
+            The wall time.
+
+        Raises:
+            StateError: the motion became unstable.
+            PathError: a path was not found, with `strict`.
         """
         data, timestep, steps = self.engine.data, self._timestep, self._steps
         stride = max(1, round(self.settings.sample / timestep))
@@ -145,8 +170,20 @@ class Simulation:
 def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = DEFAULT_KINDS) -> Table:
     """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
 
-    source: an MJCF or MJB file, or "myo_sim:NAME". kinds: the quantities in the table, of `run_table.KINDS`; columns
-    are called KIND:NAME, in SI units. Raises the errors of `Simulation` and of its `advance`.
+    Args:
+        source: an MJCF or MJB file, or "myo_sim:NAME".
+        settings: the settings of the run; None for the defaults.
+        kinds: the quantities in the table, such as "qpos", "length" or "moment_arm", as for `mjwrap run --columns`.
+
+    Returns:
+        The table, with columns called KIND:NAME, in SI units.
+
+    Raises:
+        ModelError: the model cannot be loaded, or a setting does not fit it.
+        SignalError: an entry of the excitation or of the prescribed joints is not valid.
+        StateError: the motion became unstable.
+        PathError: a path was not found, with `strict`.
+        TableError: a kind is unknown.
     """
     simulation = Simulation(source, settings or RunSettings())
     table = RunTable(simulation.muscles.model, simulation.muscles, kinds)

@@ -25,9 +25,16 @@ _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 @dataclass(frozen=True)
 class States:
-    """States (T, ...): time [s], qpos, qvel, act, ctrl; remarks: values missing from the table, and their substitutes.
+    """States of a model over time.
 
-    own (T, 2n): activation and fibre length [m] of each muscle, used for muscles whose states are not in `act`.
+    Attributes:
+        time: (T,) times [s].
+        qpos: (T, nq) positions.
+        qvel: (T, nv) velocities.
+        act: (T, na) activations.
+        ctrl: (T, nu) controls.
+        own: (T, 2n) activation and fibre length [m] of each muscle, used for muscles whose states are not in `act`.
+        remarks: values that are missing from the table, and their substitutes.
     """
 
     time: Array
@@ -71,8 +78,19 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
     in tables of `mjwrap run`; "qpos[3]" by index; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
     "MUSCLE/fiber_length" as in OpenSim's files, with or without a path before them. "act" overrides other columns for
     the same state. Rotations are in rad, or in degrees if the header says so. Velocities that are missing are computed
-    as differences of the positions. Raises `TableError` if no column names a joint, and for arrays whose size does not
-    fit the model.
+    as differences of the positions.
+
+    Args:
+        model: the model.
+        muscles: its muscles.
+        start: data with the values for everything that is missing from the table.
+        table: the table.
+
+    Returns:
+        The states.
+
+    Raises:
+        TableError: no column names a joint, or the size of an array does not fit the model.
     """
     reader = _Reader(model, muscles, start, table)
     reader.check_widths()

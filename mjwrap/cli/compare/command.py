@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--plot", metavar="FILE.png", help="plot the comparison (.png, .pdf, .svg)")
     add("--report", metavar="FILE.html", help="write a page with a table of all muscles, plots and verdicts")
     add("--csv", metavar="FILE.csv", help="write a row for every muscle and pose, without sweeps that "
-        "change nothing; with --lengths or --moment-arms also FILE_tables.csv")  # fmt: skip
+        "change nothing; with tables of another program also FILE_tables.csv")  # fmt: skip
     add(
         "--csv-all",
         action="store_true",

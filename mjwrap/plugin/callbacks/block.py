@@ -48,8 +48,8 @@ ARRAYS = (
     A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
     A_PLAIN, A_PLAIN_SEEN, A_DERIVED, A_DERIVED_SEEN, A_STRUCTURE, A_STRUCTURE_SEEN, A_BOUND, A_DRIVES, A_POINTERS,
 ) = range(48, 48 + len(ARRAYS))  # fmt: skip
-# how to draw: byte offsets in MuJoCo's structs (of an option: of its byte), the size of a mjvGeom, MuJoCo's codes, the
-# address of a function that warns and of what it says
+# for drawing: byte offsets in MuJoCo's structs (for an option: of its byte), the size of an mjvGeom, MuJoCo's codes,
+# the addresses of a function that warns and of its message
 DRAWING = (
     "scene.maxgeom", "scene.ngeom", "scene.geoms", "scene.status",
     "option.label", "option.tendon", "option.actuator", "option.activation", "option.transparent",
@@ -84,7 +84,7 @@ HEAD = _FIRST + len(DRAWING)
 
 SILENT = -2  # in `group`: the muscle's own tension is zero, since its actuator pulls
 
-# entries of `clock`: time of the first evaluation since the last step where the state's own clock says nothing;
+# entries of `clock`: time of the first evaluation since the last step, used while the state has no time of its own;
 # whether there was an evaluation since the last step
 FIRST, ACTED = 0, 1
 CLOCK = 2
