@@ -204,8 +204,8 @@ def test_states_by_opensims_names_in_degrees(tmp_path: Path, capsys: pytest.Capt
     facts = json.loads(ran.out)
     assert facts["remarks"] == [
         "velocities are differences of the positions",
-        "6 of 7 activations not given: TRIlong, TRIlat, TRImed, BIClong, BICshort, ...: as at the start",
-        "1 column not about the state: /ground_force/px",
+        "6 of 7 activations missing, taken from the start: TRIlong, TRIlat, TRImed, BIClong, BICshort, ...",
+        "1 column not used: /ground_force/px",
     ]
     table = mw.read_table(out)
     assert table["qpos:elbow_flexion"] == pytest.approx(np.radians(angle), rel=1e-15)

@@ -96,7 +96,7 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "not finite": (lambda x, y, z: math.log(x) + y + z, "phi is not finite at"),
     "positive": (
         lambda x, y, z: x * x + y * y + z * z + 1.0,
-        "phi is positive all over the box.*choose `extent`",
+        "phi is positive in the whole box.*choose `extent`",
     ),
     "vanishing": (lambda x, y, z: (x * x + y * y + z * z - 9e-4) ** 3, "gradient"),
 }

@@ -127,7 +127,7 @@ def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> No
     [
         ([0.0, 1.0], ("a",), (2, 2), "do not fit"),
         ([0.0, 0.0], ("a",), (2, 1), "row 2"),
-        ([0.0], ("",), (1, 1), "blank"),
+        ([0.0], ("",), (1, 1), "the empty names"),
     ],
 )
 def test_a_table_fits_together(

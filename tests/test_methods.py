@@ -292,7 +292,7 @@ def test_a_wrong_scene_is_named() -> None:
         solve_chain("nr", ORIGIN, INSERTION, [mw.Cylinder(0.01)], np.zeros((2, 3)), np.eye(3)[None])
     with pytest.raises(mw.GeometryError, match="origin must be finite"):
         solve_chain("nr", np.full(3, np.nan), *SCENE[1:])
-    with pytest.raises(mw.GeometryError, match="know Cylinder and Sphere, not Surface"):
+    with pytest.raises(mw.GeometryError, match="support only Cylinder and Sphere, not Surface"):
         solve_chain("nr", ORIGIN, INSERTION, [Surface()], np.zeros((1, 3)), np.eye(3)[None])
     with pytest.raises(mw.GeometryError, match=r"start s must have shape \(1,\)"):
         start = (np.zeros((1, 3)), np.ones((1, 3)), np.zeros(2), np.ones(1, dtype=bool))

@@ -64,10 +64,10 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
             before, after = _sides(comparer, pair, program, place, jump[0], span)
             told_as = program, pair.name, motion.name, *jump, before, after, motion.base
             found.append(Jump(*told_as, alone=motion.alone))
-    return [_beside(jump, found, batch) for jump in found]
+    return [_with_other_smooth(jump, found, batch) for jump in found]
 
 
-def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
+def _with_other_smooth(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
     """Set whether the other program is smooth at a jump."""
     (pair,) = (pair for pair in batch.pairs if pair.name == jump.muscle)
     k = int(np.clip(np.searchsorted(batch.motion.at, jump.at), 1, len(batch.motion.at) - 1))

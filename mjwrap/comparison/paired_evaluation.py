@@ -42,7 +42,7 @@ class PathRecord:
     hinted: NDArray[np.bool_]
 
 
-class _Pair(NamedTuple):
+class _ComparedMuscle(NamedTuple):
     """A muscle to compare: name, index in the MuscleSystem or -1, tendon, spans."""
 
     name: str
@@ -95,15 +95,15 @@ class Comparer:
         self.data = mujoco.MjData(self.model)
         self.follower = PathFollower(muscles, self.data)
         self.left_out: dict[str, str] = {}
-        self._pairs: list[_Pair] = []
+        self._selected: list[_ComparedMuscle] = []
         for name in wanted:
-            found = self._pair(name)
+            found = self._compared(name)
             if isinstance(found, str):
                 self.left_out[name] = found
             else:
-                self._pairs.append(found)
+                self._selected.append(found)
 
-    def _pair(self, name: str) -> _Pair | str:
+    def _compared(self, name: str) -> _ComparedMuscle | str:
         """Return the muscle to compare, or the reason why it cannot be compared."""
         model = self.model
         if name in self.muscles.names:
@@ -114,13 +114,13 @@ class Comparer:
             own = muscle_spans(declared)
             if own is None or own != tendon_spans(model, self._native_data, declared.tendon):
                 return "its tendon is a placeholder: mjwrap's route is different"
-            return _Pair(name, index, declared.tendon, own)
+            return _ComparedMuscle(name, index, declared.tendon, own)
         actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if actuator < 0 or int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
             return "it has no spatial tendon"
         tendon = int(model.actuator_trnid[actuator, 0])
         spans = tendon_spans(model, self._native_data, tendon)
-        return _Pair(name, -1, tendon, spans) if spans else "it has no spatial tendon"
+        return _ComparedMuscle(name, -1, tendon, spans) if spans else "it has no spatial tendon"
 
     def evaluate(self, motion: PoseSequence, start: Array | None = None) -> Batch:
         """Evaluate all poses of a motion; start (nq,): pose from which a continuous motion takes its branches."""
@@ -129,7 +129,7 @@ class Comparer:
         wraps = WrapRecord(self.model, count)
         contacts: list[dict[int, Array]] = []
         geoms = _Frames(count, self.model)
-        taken = [pair.index for pair in self._pairs if pair.index >= 0]
+        taken = [muscle.index for muscle in self._selected if muscle.index >= 0]
         branches: list[Array] = []
         self.muscles.reset(self.data)
         if motion.continuous and start is not None:
@@ -145,7 +145,7 @@ class Comparer:
             branches.append(self.muscles.branch(self.data))
         slopes = np.einsum("tnv,tv->tn", mine.jacobian, motion.tangent)
         batch = Batch(motion, SweepTrace(motion.at, mine.length, slopes, mine.status == 0, branches))
-        for name, index, tendon, spans in self._pairs:
+        for name, index, tendon, spans in self._selected:
             points = wraps.points(tendon, spans)
             record = self._record(spans, points, geoms, INSIDE_TOLERANCE, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)

@@ -200,13 +200,13 @@ class _Reader:
         fibers = [(name, *place) for name, place in self._places["fiber_length"].items()]
         remarks = []
         for what, places, instead in (
-            ("activation", activations, "as at the start"),
-            ("fibre length", fibers, "as at the start, or in static equilibrium"),
+            ("activation", activations, "taken from the start"),
+            ("fibre length", fibers, "taken from the start, or in static equilibrium"),
         ):
             left = [name for name, array, i in places if i not in self.found[array]]
             if left:
                 remarks.append(
-                    f"{len(left)} of {counted(len(places), what)} not given: {_few(left)}: {instead}"
+                    f"{len(left)} of {counted(len(places), what)} missing, {instead}: {_few(left)}"
                 )
         return remarks
 

@@ -103,10 +103,10 @@ def write_tables(output: PartFile, given: Sequence[TableColumn]) -> None:
     writer = csv.writer(output.open_text())
     with output.writing():
         writer.writerow(_TABLES)
-        for beside in given:
-            for k, time in enumerate(beside.time.tolist()):
-                figures = (float(x[k]) for x in (beside.table, beside.mujoco, beside.mjwrap))
+        for column in given:
+            for k, time in enumerate(column.time.tolist()):
+                figures = (float(x[k]) for x in (column.table, column.mujoco, column.mjwrap))
                 cells = ["" if np.isnan(x) else x for x in figures]
-                quantity = "moment arm" if beside.about else "length"
-                writer.writerow([time, beside.muscle, quantity, beside.about, *cells])
+                quantity = "moment arm" if column.about else "length"
+                writer.writerow([time, column.muscle, quantity, column.about, *cells])
     output.publish()
