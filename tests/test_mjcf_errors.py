@@ -170,7 +170,7 @@ def test_a_parameter_without_sense(key: str, value: float, wanted: str) -> None:
 def test_activation_time_constants() -> None:
     values = HILL | {"activation_time_constants": (0.01, 0.04)}
     text = message(compiled(custom=declared(ACTUATOR, values)))
-    assert "activation_time_constants is for muscles whose activation mjwrap integrates" in text
+    assert "activation_time_constants is only for muscles whose activation mjwrap integrates" in text
     model = compiled(actuator="", custom=declared([element("tendon", "extensor")], values))
     model.numeric("mjwrap_m_activation_time_constants").data[1] = 0.0
     assert "activation_time_constants must be finite and positive [s], not 0.01 and 0.0" in message(model)

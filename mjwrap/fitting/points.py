@@ -13,7 +13,7 @@ from mjwrap.errors import GeometryError, ModelError
 
 Array = NDArray[np.float64]
 Region = Callable[[Array], ArrayLike]
-_MESH = 7  # mjtGeom; this room does not import mujoco
+_MESH = 7  # mjtGeom; this package does not import mujoco
 
 
 def mesh_points(model: Any, geom: str | int, region: Region | None = None, data: Any = None) -> Array:

@@ -58,12 +58,12 @@ def set_laws(
         )
     for name, law in laws.items():
         _check(name, law, actuators.get(name), by_actuator.get(name))
-    held = [
+    holders = [
         a
         for name, law in laws.items()
         if (law.states == 2 or dynamics is not None) and (a := actuators.get(name))
     ]
-    _make_room(spec, held)
+    _insert_fiber_lengths(spec, holders)
     for name, law in laws.items():
         chosen = dynamics
         actuator = actuators.get(name)
@@ -96,7 +96,7 @@ def _check(name: str, law: object, actuator: Any, entry: Any) -> None:
         raise ModelError(f"muscle '{name}': the gear of its actuator is not positive, so it pushes")
 
 
-def _make_room(spec: mujoco.MjSpec, holders: list[Any]) -> None:
+def _insert_fiber_lengths(spec: mujoco.MjSpec, holders: list[Any]) -> None:
     """Insert a fibre length of 0 after the activation of actuators in every keyframe that has activations."""
     keys = [key for key in spec.keys if len(key.act)]
     if not keys or not holders:

@@ -71,20 +71,20 @@ def scalar_table(entities: Sequence[str]) -> Table:
     return Table((entity, rr.Scalars.descriptor_scalars(), pa.float64()) for entity in entities)
 
 
-def scalar_columns(values: Array, room: Array) -> list[pa.Array]:
-    """Convert values (T, m) to m columns of T rows; room (m, T): memory for them."""
+def scalar_columns(values: Array, memory: Array) -> list[pa.Array]:
+    """Convert values (T, m) to m columns of T rows; memory (m, T): for the result."""
     rows, columns = values.shape
-    room[:] = values.T
+    memory[:] = values.T
     # one array contains all columns, one after the other; a column is a slice of it, which costs almost nothing
-    whole = pa.ListArray.from_arrays(_one_each(rows * columns), pa.array(room.ravel()))
+    whole = pa.ListArray.from_arrays(_one_each(rows * columns), pa.array(memory.ravel()))
     return [whole.slice(i * rows, rows) for i in range(columns)]
 
 
-def vector_columns(values: Array, widths: Sequence[int], room: Array) -> list[pa.Array]:
-    """Convert values (T, K) to a column of T rows for each width, the number of values per row; room (T K,): memory."""
+def vector_columns(values: Array, widths: Sequence[int], memory: Array) -> list[pa.Array]:
+    """Convert values (T, K) to a column of T rows for each width (values per row); memory (T K,): for the result."""
     rows, columns, start = len(values), [], 0
     for width in widths:
-        part = room[rows * start : rows * (start + width)]
+        part = memory[rows * start : rows * (start + width)]
         part.reshape(rows, width)[:] = values[:, start : start + width]
         columns.append(pa.ListArray.from_arrays(_one_each(rows, width), pa.array(part)))
         start += width

@@ -202,9 +202,9 @@ class Buffers:
             batches.append(self._tables["joints"].batch(self._qpos_time[: self._frames], cells))
         if self._widths:
             arms = self._history.moment_arms(self._frames)
-            pool = self._pool.array("moment_arm", (arms.size,))
+            memory = self._pool.array("moment_arm", (arms.size,))
             batches.append(
-                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, pool))
+                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, memory))
             )
         colors = columns.activation_colors(self._history.states(self._rows)["activation"][rows])
         history, frames = self._history, self._frames

@@ -8,7 +8,7 @@ import rerun as rr
 from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
 from mjwrap.surfaces.triangles import surface_grid, triangles
 
-# mjtGeom; this room does not import mujoco
+# mjtGeom; this package does not import mujoco
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
 
 DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)

@@ -40,7 +40,7 @@ class Store:
         self.rows = np.empty((0, width), dtype=np.float32)
         self.starts = np.zeros((frames, parts + 1), dtype=np.int64)  # where each part of a frame begins
 
-    def make_room(self, frame: int) -> None:
+    def grow(self, frame: int) -> None:
         """Grow if a frame did not fit: the first frame, or a later one with more to draw."""
         begin, end = int(self.starts[frame, 0]), int(self.starts[frame, -1])
         if end > len(self.rows):
@@ -110,7 +110,7 @@ class History:
             self._positions, self._quaternions,
         ):  # fmt: skip
             for store in (points, contacts, forces):
-                store.make_room(frame)
+                store.grow(frame)
 
     def states(self, rows: int) -> dict[str, Array]:
         """Return the numbers of the first `rows` states, (rows, n) each, by their names in `Results`."""
@@ -134,7 +134,7 @@ class History:
         points of each strip; counts: number of strips of a muscle in a frame, 0 if no path was found yet.
         """
         store, routes = self._points, self._plan[0]
-        out, counts = self._pool(pool, "points", store, frames)
+        out, counts = self._arrays(pool, "points", store, frames)
         sizes = np.empty(len(routes) * frames, dtype=np.int64)
         first = np.searchsorted(
             routes[:, muscle_paths.R_MUSCLE], np.arange(len(counts) + 1)
@@ -147,7 +147,7 @@ class History:
     def contacts(self, frames: int, pool: BufferPool | None = None) -> tuple[Singles, Ints]:
         """Return contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
         store = self._contacts
-        out, counts = self._pool(pool, "contacts", store, frames)
+        out, counts = self._arrays(pool, "contacts", store, frames)
         recorded_frames.gather(store.rows, store.starts, self._where, out, counts)
         return out, counts
 
@@ -160,14 +160,14 @@ class History:
         The force on a surface or via point, the sum over the contact, ends midway between the contact points.
         """
         store = self._forces
-        tails, counts = self._pool(pool, "tails", store, frames)
-        vectors, _ = self._pool(pool, "vectors", store, frames)
+        tails, counts = self._arrays(pool, "tails", store, frames)
+        vectors, _ = self._arrays(pool, "vectors", store, frames)
         recorded_frames.gather_arrows(
             store.rows, store.starts, self._where, float(scale), tails, vectors, counts
         )
         return tails, vectors, counts
 
-    def _pool(self, pool: BufferPool | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
+    def _arrays(self, pool: BufferPool | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
         """Return arrays for the points of a store's first frames in another order, and for their counts."""
         points = (pool or BufferPool()).array(name, (store.count(frames), 3), np.float32)
         return points, np.empty((self._n, frames), dtype=np.int64)

@@ -38,13 +38,13 @@ def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: list[Muscle
         stops = plan.links[route[muscle_paths.R_LO] : route[muscle_paths.R_HI], muscle_paths.L_BODY].tolist()
         bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
         moved = {body: set(np.flatnonzero(moves[body]).tolist()) for body in bodies}
-        room = _columns(model, muscle.actuator) | set.intersection(*moved.values())
+        stored = _columns(model, muscle.actuator) | set.intersection(*moved.values())
         for body, dofs in moved.items():
-            if not dofs <= room:
+            if not dofs <= stored:
                 tendon = name_of(model, OBJ.mjOBJ_TENDON, int(model.actuator_trnid[muscle.actuator, 0]))
                 raise ModelError(
                     f"muscle '{muscle.name}': its path runs over body '{name_of(model, OBJ.mjOBJ_BODY, body)}', which "
-                    f"tendon '{tendon}' does not touch, so MuJoCo keeps no room for its moment there; let the tendon "
+                    f"tendon '{tendon}' does not touch, so MuJoCo does not store its moment there; let the tendon "
                     f"pass a site on that body, or use mode 'wrench'"
                 )
 

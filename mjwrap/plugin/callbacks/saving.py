@@ -75,11 +75,11 @@ def load(block, state):
             for i in range(4):
                 node[k, lay.HINT + i] = state[at + lay.STATE + i]
             at += SAVED
-        at += _room(c, route)
+        at += _segment_numbers(c, route)
 
 
 @jit
-def _room(c, route):
+def _segment_numbers(c, route):
     """Return the number of entries of plugin_state for the segments of route c: their count, and a row for each."""
     return 1 + sg.SEGMENT * (route[c, R_HI] - route[c, R_LO] + 1)
 
@@ -111,7 +111,7 @@ def load_held(block, state):
             fits = 0.0 <= state[at] <= most  # the user may have written to plugin_state
             count[c] = int(state[at]) if fits else 0
             _copy(sg.SEGMENT * count[c], state, at + 1, seg, sg.SEGMENT * (route[c, R_LO] + c))
-        at += _room(c, route)
+        at += _segment_numbers(c, route)
 
 
 @jit
@@ -145,4 +145,4 @@ def save(block, state):
             at += SAVED
         state[at] = count[c]
         _copy(sg.SEGMENT * count[c], seg, sg.SEGMENT * (route[c, R_LO] + c), state, at + 1)
-        at += _room(c, route)
+        at += _segment_numbers(c, route)

@@ -27,8 +27,8 @@ def _memory_on_stack(typing_context: Any) -> Any:
     """Return a pointer to memory for all columns on the caller's stack."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        room = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), _ROOM))
-        return builder.bitcast(room, ir.DoubleType().as_pointer())
+        memory = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), _ROOM))
+        return builder.bitcast(memory, ir.DoubleType().as_pointer())
 
     return types.CPointer(types.float64)(), generate
 
