@@ -44,7 +44,7 @@ def test_a_comparison_in_text_json_csv_and_a_picture(
     assert {row["outcome"] for row in rows} == {"AGREE"}
     assert all(abs(float(row["length_mujoco"]) - float(row["length_mjwrap"])) < 1e-9 for row in rows)
     assert "both, equal at every pose" in ran.out
-    assert "7 muscles with another law run with MuJoCo's curves in both" in ran.out
+    assert "7 muscles with another law: MuJoCo's curves in both" in ran.out
 
 
 def test_a_report_is_one_page_that_loads_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -228,7 +228,7 @@ class Torus(Surface):
     minor_radius: float
     kind: ClassVar[int] = layout.TORUS
     branched: ClassVar[bool] = True
-    touches: ClassVar[int] = 2  # beside the string itself, one over the hole
+    touches: ClassVar[int] = 2  # a string can bridge the hole and touch the ring before and after it
     numeric: ClassVar[str] = "torus_size"
     numeric_sizes: ClassVar[str] = "major_radius minor_radius"
     numeric_least: ClassVar[int] = 2

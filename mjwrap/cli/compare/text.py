@@ -135,9 +135,7 @@ def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries:
     say(f"\nsimulation over {motion.time[-1]:g} s, excitation {' '.join(entries)}; mjwrap minus MuJoCo")
     if changed:
         those = counted(len(changed), "muscle")
-        say(
-            f"  {those} with another law run with MuJoCo's curves in both (--law declared: with their own law)"
-        )
+        say(f"  {those} with another law: MuJoCo's curves in both (--law declared: their own law)")
     dof, gap, when = motion.worst()
     last, final = motion.final()
     say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")
