@@ -52,7 +52,7 @@ class Evaluator(Results):
 
     @property
     def excitation(self) -> Array:
-        """Excitations (n,) of muscles without an actuator: set single entries, or all; `StateError` for a wrong shape."""
+        """Excitations (n,) of muscles without an actuator: set single ones, or all; `StateError` for a wrong shape."""
         return self._excitation
 
     @excitation.setter
