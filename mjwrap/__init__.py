@@ -13,7 +13,7 @@ _load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module when it is first used, so that importing mjwrap costs next to nothing."""
+    """Load a public name from its module when it is first used, so that importing mjwrap is fast."""
     if name not in __all__:
         raise AttributeError(f"module 'mjwrap' has no attribute {name!r}; it has: {', '.join(__all__)}")
     return _load(name)

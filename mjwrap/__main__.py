@@ -1,4 +1,4 @@
-"""`python -m mjwrap` is the command `mjwrap`."""
+"""Run the command `mjwrap` by `python -m mjwrap`."""
 
 import sys
 

@@ -1,44 +1,43 @@
-"""The exceptions, in one tree.
+"""The exceptions of mjwrap.
 
-Every error that mjwrap raises for a reason that its user can correct is a `MjwrapError`. Each is also the
-built-in exception that fits, so that `except ValueError` keeps working. A message names the element, says
-what is wrong with it, and lists what exists instead.
+Every error that a user can correct is a `MjwrapError`. Each is also a built-in exception of the same kind, so that
+`except ValueError` works too. A message names the element, says what is wrong with it, and lists what exists instead.
 """
 
 
 class MjwrapError(Exception):
-    """Root of every error that mjwrap raises on purpose; catch it to catch them all."""
+    """The base class of all errors of mjwrap."""
 
 
 class ModelError(MjwrapError, ValueError):
-    """An MJCF model or one of its muscle declarations cannot be used as it stands.
+    """An MJCF model or one of its muscle declarations cannot be used.
 
-    The message names the muscle and the element at fault, and lists the names that the model has.
+    The message names the muscle and the element, and lists the names that exist in the model.
     """
 
 
 class GeometryError(MjwrapError, ValueError):
-    """A surface or a point has a size or a position that no path can be computed with.
+    """A surface or a point has a size or a position with which no path can be computed.
 
     Radii [m] must be finite and positive, points (3,) [m] finite, quaternions (4,) finite and not zero.
     """
 
 
 class PathError(MjwrapError, RuntimeError):
-    """A muscle's path could not be found, and the caller asked to be stopped for that (`strict=True`).
+    """A muscle's path could not be found, and `strict=True` was given.
 
-    Without `strict` the status of the solution says the same and nothing is raised.
+    Without `strict` nothing is raised, and the status of the solution gives the reason.
     """
 
 
 class StateError(MjwrapError, ValueError):
-    """A simulation state (position, velocity, activation, control) is not finite."""
+    """A simulation state (position, velocity, activation, control) is not valid, or a call does not fit the state."""
 
 
 class SignalError(MjwrapError, ValueError):
-    """An excitation, control or prescribed motion cannot be read: a wrong pattern, file or name.
+    """An excitation, control or prescribed motion has a wrong pattern, file or name.
 
-    The message names the pattern, or file, line and column, and lists what exists.
+    The message names the pattern, or the file, line and column, and lists what exists.
     """
 
 
@@ -47,11 +46,11 @@ class TableError(SignalError):
 
 
 class RecordingError(MjwrapError, OSError):
-    """A recording could not be written: no such folder, no permission, or no space left."""
+    """A recording, film or output file cannot be written, or a recording cannot be read."""
 
 
 class VersionError(MjwrapError, RuntimeError):
-    """The installed MuJoCo is too old, or is not one that the engine plugin can verify.
+    """The installed MuJoCo is too old, or the engine plugin cannot verify its layout.
 
     In the second case `MuscleSystem` works without the plugin.
     """

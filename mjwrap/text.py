@@ -4,14 +4,15 @@ from collections.abc import Collection, Iterable, Sequence
 
 
 def counted(number: float, noun: str) -> str:
-    """Return a number of things, such as "1 pose" and "2 poses"."""
+    """Return a number with a noun in singular or plural, such as "1 pose" and "2 poses"."""
     return f"{number:.0f} {noun}{'s' * (number != 1)}"
 
 
 def aligned(rows: Iterable[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
-    """Return rows of cells as lines of text with their columns aligned, two spaces apart; heads are a row like others.
+    """Return rows of cells as lines of text with aligned columns, two spaces apart; the heads are a row, too.
 
-    left: columns that stand at the left, others at the right. Nothing is wrapped or cut, and no line ends in spaces.
+    left: columns aligned at the left; the others are aligned at the right. Cells are not wrapped or cut, and no line
+    ends in spaces.
     """
     cells = [list(row) for row in rows]
     wide = [max(map(len, column)) for column in zip(*cells, strict=True)]

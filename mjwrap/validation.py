@@ -1,4 +1,4 @@
-"""Numbers that a caller gives: whether they can be used, and the error to raise where they cannot."""
+"""Validate numbers that a caller gives."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def positive(
 ) -> float:
     """Return `value` as a float; raise `error` unless it is positive and, if not `unbounded`, finite.
 
-    name: of the value, as the message begins; unit: in the message, such as "m".
+    name: beginning of the message, which names the value; unit: for the message, such as "m".
     """
     number = _number(value)
     if not (number > 0.0 and (unbounded or math.isfinite(number))):
@@ -28,7 +28,7 @@ def positive(
 
 
 def not_negative(value: Any, name: str, error: type[MjwrapError], unit: str = "") -> float:
-    """Return `value` as a float; raise `error` unless it is finite and zero or more. Arguments as of `positive`."""
+    """Return `value` as a float; raise `error` unless it is finite and zero or more. Arguments as for `positive`."""
     number = _number(value)
     if not 0.0 <= number < math.inf:
         raise error(f"{name} must be finite and >= 0{f' [{unit}]' * bool(unit)}, not {value!r}")
@@ -36,7 +36,7 @@ def not_negative(value: Any, name: str, error: type[MjwrapError], unit: str = ""
 
 
 def _number(value: Any) -> float:
-    """Return a value as a float, NaN where it is no number: text is none, whatever it says."""
+    """Return a value as a float, NaN if it is not a number; text is never a number, even "1"."""
     try:
         return math.nan if isinstance(value, str | bytes) else float(value)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""What only newer releases of MuJoCo have: the tests of it are skipped where it is missing, and say so."""
+"""Skip marks for tests of features that only newer releases of MuJoCo have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a muscle's activation comes from: MuJoCo's states and controls, or mjwrap's own, exact, dynamics."""
+"""Activations from MuJoCo's states and controls, and mjwrap's own activation dynamics."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ import mjwrap as mw
 from mjwrap.surfaces import Surface
 from mjwrap.verification.arcs import arcs_of, slow_arc
 from mjwrap.verification.certificate import Case, findings, grouped, laid_out, stiffness
+from mjwrap.verification.perturbation import lowest, stiffness_by_differences
 from mjwrap.verification.scenes import random_surface
-from mjwrap.verification.shaking import lowest, shaken_stiffness
 from mjwrap.verification.shapes import SHAPES, Array, Shape, dot, sizes, unit
 
 LETTERS = "cselktp"
@@ -362,6 +362,6 @@ def test_the_stiffness_is_the_second_derivative_of_length(letter: str) -> None:
         over = np.array([[1.0, 0.0], [a, r / touches[0].s]])  # shifts of P and Q from (x, w)
         inverse = np.linalg.inv(over)
         H = inverse.T @ stiffness(touches) @ inverse
-        shaken = shaken_stiffness(case)
+        shaken = stiffness_by_differences(case)
         assert shaken == pytest.approx(H, abs=1e-3 * np.abs(H).max())
         assert lowest(shaken) == pytest.approx(lowest(H), abs=1e-3)

@@ -22,7 +22,7 @@ def test_a_sound_model_passes_every_check(path: str) -> None:
     found = check(path)
     assert found.table().count("pass") == len(found.checks) == 10, found.table()
     (arms,) = (c for c in found.checks if c.name == "moment_arm")
-    assert arms.remarks == ["differences come to it at order 2.00 (second order is 2)"]
+    assert arms.remarks == ["differences converge to it with order 2.00 (expected: 2)"]
 
 
 def failed_when(monkeypatch: pytest.MonkeyPatch, name: str, spoil: Callable[[Any], Any]) -> set[str]:

@@ -14,7 +14,7 @@ from cli_runs import CASE2, ELBOW, Ran, finish, run_here, said, start
 from test_comparison import BALL
 
 import mjwrap as mw
-from mjwrap.comparison.twins import Comparer
+from mjwrap.comparison.paired_evaluation import Comparer
 
 
 def compare(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ran:
@@ -44,7 +44,7 @@ def test_a_comparison_in_text_json_csv_and_a_picture(
     assert {row["outcome"] for row in rows} == {"AGREE"}
     assert all(abs(float(row["length_mujoco"]) - float(row["length_mjwrap"])) < 1e-9 for row in rows)
     assert "both, equal at every pose" in ran.out
-    assert "7 muscles of another law by MuJoCo's curves in both" in ran.out
+    assert "7 muscles with another law: MuJoCo's curves in both" in ran.out
 
 
 def test_a_report_is_one_page_that_loads_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -125,10 +125,10 @@ def test_where_they_differ_it_says_who_is_right(tmp_path: Path, capsys: pytest.C
     ran = compare(capsys, model, "--samples", 41, "--duration", 0.05, "--plot", tmp_path / "p.svg", "--check")
     assert ran.code == 0, ran.err  # --check asks for mjwrap only
     assert re.search(
-        r"^  m: mjwrap: MuJoCo's path is no geodesic at \d+ of 82 poses \(geom 'ball'\)", ran.out, re.M
+        r"^  m: mjwrap: MuJoCo's path is not a geodesic at \d+ of 82 poses \(geom 'ball'\)", ran.out, re.M
     )
     assert "MuJoCo m at slide = -0.0100" in ran.out
-    assert "where lengths differ most" in ran.out
+    assert "largest differences of length" in ran.out
 
 
 def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_check_fails_where_mjwrap_is_wrong(
     assert compare(capsys, *options).code == 0
     ran = compare(capsys, *options, "--check")
     assert ran.code == 1
-    assert "muscle: MuJoCo: at 10 poses both are judged the same geodesic, but differ" in ran.out
+    assert "muscle: MuJoCo: at 10 poses both are judged to be the same geodesic, but differ" in ran.out
 
 
 @pytest.mark.parametrize(

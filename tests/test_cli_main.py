@@ -137,7 +137,9 @@ def mujoco_names(path: str) -> list[str]:
 def test_inspect_says_mistakes_before_anything_else(capsys: pytest.CaptureFixture[str]) -> None:
     ran = inspect(capsys, ELBOW, "--range", "knee=0,1")
     assert (ran.code, ran.out) == (2, "")
-    assert said(ran) == ["mjwrap inspect: no joint 'knee' to give a range; joints: elbow_flexion"]
+    assert said(ran) == [
+        "mjwrap inspect: there is no joint 'knee' for which a range is given; joints: elbow_flexion"
+    ]
 
 
 def test_files_are_written_where_nobody_reads_standard_output(tmp_path: Path) -> None:
@@ -158,7 +160,7 @@ def test_inspect_says_what_stays_native_and_why(capsys: pytest.CaptureFixture[st
     muscle = '<muscle name="joint" joint="cylinder_y" lengthrange="0 1"/>'
     path.write_text(Path(CASE2).read_text().replace("</actuator>", f"{muscle}</actuator>"))
     ran = inspect(capsys, path, "--quick")
-    assert "1 muscle along geodesic paths, 1 with MuJoCo's own" in ran.out
+    assert "1 muscle with geodesic paths, 1 with MuJoCo's own paths" in ran.out
     assert "joint: stays with MuJoCo: " in ran.out
     assert list(json.loads(inspect(capsys, path, "--quick", "--json").out)["native"]) == ["joint"]
 
@@ -182,7 +184,7 @@ def test_check_passes_or_fails_by_its_exit_code(capsys: pytest.CaptureFixture[st
     ran = run_here("check", capsys, empty)
     assert (ran.code, said(ran)) == (
         2,
-        ["mjwrap check: the model has no muscles along geodesic paths: nothing to check"],
+        ["mjwrap check: the model has no muscles with geodesic paths: nothing to check"],
     )
 
 

@@ -32,7 +32,7 @@ from mjwrap import Table, write_table
         ([ELBOW, "--qpos", "elbow_flexion"], "write JOINT=VALUE"),
         ([ELBOW, "--qpos", "elbow_flexion=bent"], "not a number"),
         ([ELBOW, "--prescribe", "elbow_flexion"], "write JOINT=PATTERN.*joints: elbow_flexion"),
-        ([ELBOW, "--rate", "50"], "goes with --record, --connect or --serve"),
+        ([ELBOW, "--rate", "50"], "--rate needs a recording: add --record, --connect or --serve"),
         ([ELBOW, "--record", "{folder}/r.rrd", "--groups", "flexors"], "write NAME=PATTERN,PATTERN"),
         (
             [ELBOW, "--record", "{folder}/r.rrd", "--groups", "flexors=BIX*"],
@@ -49,16 +49,16 @@ from mjwrap import Table, write_table
         ([ELBOW, "--record", "{folder}/missing/r.rrd"], "no folder"),
         ([ELBOW, "--record", "{folder}/r.bin"], r"must end in \.rrd"),
         ([ELBOW, "--out", "{folder}/t.xlsx"], r"must end in \.sto or \.mot or \.csv or \.npz"),
-        ([ELBOW, "--columns", "length"], "goes with --out or --csv"),
-        ([ELBOW, "--camera", "side"], "goes with --video"),
-        ([ELBOW, "--duration", "long"], "'long' is no number"),
+        ([ELBOW, "--columns", "length"], "needs a table: add --out or --csv"),
+        ([ELBOW, "--camera", "side"], "needs a film: add --video"),
+        ([ELBOW, "--duration", "long"], "'long' is not a number"),
         (
             [ELBOW, "--csv", "{folder}/t.csv", "--columns", "length,weight"],
             "no kind 'weight'; kinds: qpos, qvel",
         ),
         (
             [ELBOW, "--video", "{folder}/f.gif", "--mode", "python"],
-            "--video shows the muscles of the engine plugin",
+            "--video needs the engine plugin",
         ),
         ([ELBOW, "--video", "{folder}/f.avi"], r"\.mp4|OpenGL"),
         ([ELBOW, "--video", "{folder}/f.gif", "--video-size", "640"], "like 640x480"),
@@ -134,7 +134,7 @@ def test_no_output_takes_the_place_of_an_input(
 
 @pytest.mark.parametrize(
     ("command", "told"),
-    [("check", "no check failed"), ("compare", "no motion: the model has no joint")],
+    [("check", "no check failed"), ("compare", "no simulation: the model has no joint")],
 )
 def test_a_model_without_joints_has_nothing_to_sweep(
     command: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

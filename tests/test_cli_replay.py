@@ -50,7 +50,7 @@ def test_replay_prints_what_a_recording_holds(model: mujoco.MjModel, tmp_path: P
         ("empty", "not a complete recording"),
         ("text", "not a complete recording"),
         ("cut", "not a complete recording"),
-        ("no end", "cut short"),
+        ("no end", "is incomplete"),
         ("scratched", "not a complete recording"),
     ],
 )
@@ -204,8 +204,8 @@ def test_states_by_opensims_names_in_degrees(tmp_path: Path, capsys: pytest.Capt
     facts = json.loads(ran.out)
     assert facts["remarks"] == [
         "velocities are differences of the positions",
-        "6 of 7 activations not given: TRIlong, TRIlat, TRImed, BIClong, BICshort, ...: as at the start",
-        "1 column not about the state: /ground_force/px",
+        "6 of 7 activations missing, taken from the start: TRIlong, TRIlat, TRImed, BIClong, BICshort, ...",
+        "1 column not used: /ground_force/px",
     ]
     table = mw.read_table(out)
     assert table["qpos:elbow_flexion"] == pytest.approx(np.radians(angle), rel=1e-15)
@@ -238,14 +238,14 @@ def test_arrays_of_states_need_no_names(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["{states}"], "is a table of states: --model says of which model"),
+        (["{states}"], "is a table of states: name its model with --model"),
         (["{states}", "--model", "nowhere.xml"], "nowhere.xml does not exist"),
         (["{states}", "--model", CASE2], "no column names a joint; the model has: cylinder_y"),
         (["{states}", "--model", ELBOW, "--out", "{folder}/t.pdf"], "must end in .sto"),
         (["{states}", "--model", ELBOW, "--record", "{folder}/r.txt"], "must end in .rrd"),
         (["{states}", "--model", ELBOW, "--keyframe", "bent", "--info"], "'bent'; keyframes"),
         (["{folder}/no.csv", "--model", ELBOW], "no such file"),
-        (["{folder}/no.rrd", "--model", ELBOW], "--model goes with a table of states"),
+        (["{folder}/no.rrd", "--model", ELBOW], "--model needs a table of states"),
         (["{folder}/no.rrd"], "there is no recording"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What mjwrap run says: positions outside a range, and what simulation and files took."""
+"""Messages of mjwrap run: positions outside a range, and the times of simulation and files."""
 
 import json
 from pathlib import Path

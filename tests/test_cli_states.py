@@ -95,7 +95,7 @@ def test_fibre_lengths_that_are_not_there_are_named(
     states, out = tmp_path / "s.csv", tmp_path / "t.csv"
     mw.write_table(states, mw.Table(np.arange(2.0), columns, np.full((2, len(columns)), 0.3)))
     ran = run_here("replay", capsys, states, "--model", elastic, "--out", out)
-    assert "2 of 2 fibre lengths not given: BRA, BRD: as at the start, or in static equilibrium" in ran.out
+    assert "2 of 2 fibre lengths missing, taken from the start, or in static equilibrium: BRA, BRD" in ran.out
     assert "activations" not in ran.out
 
 
@@ -132,4 +132,4 @@ def test_columns_of_another_model_are_named(tmp_path: Path, capsys: pytest.Captu
     states = tmp_path / "s.csv"
     mw.write_table(states, mw.Table(np.arange(2.0), names, np.full((2, 5), 0.3)))
     ran = run_here("replay", capsys, states, "--model", ELBOW, "--out", tmp_path / "t.csv")
-    assert "2 columns not about the state: qpos:knee, length:SOL" in ran.out
+    assert "2 columns not used: qpos:knee, length:SOL" in ran.out

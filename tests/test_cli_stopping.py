@@ -50,7 +50,7 @@ def test_a_run_that_is_stopped_keeps_what_was_simulated(
         lambda: any(p.suffix == ".csv" and p.stat().st_size > 20_000 for p in tmp_path.iterdir()),
     )
     assert ran.code == code, ran.err
-    assert said(ran) == [f"mjwrap run: stopped by {name}; the files hold what was simulated"]
+    assert said(ran) == [f"mjwrap run: stopped by {name}; the files contain the run up to this moment"]
     only_files(tmp_path, "c.csv", "p.png", "r.rrd", "j.json")
     assert json.loads(facts.read_text())["stopped_by"] == name
     times = np.array([row["time"] for row in rows_of(table)])

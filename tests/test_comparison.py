@@ -19,8 +19,8 @@ from mjwrap.comparison import (
     verdict,
     with_native_laws,
 )
+from mjwrap.comparison.paired_evaluation import Comparer
 from mjwrap.comparison.tendons import WrapRecord, tendon_spans
-from mjwrap.comparison.twins import Comparer
 from mjwrap.poses.continuity import refine_jump
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.system import MuscleSystem

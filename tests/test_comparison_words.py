@@ -1,4 +1,4 @@
-"""What a comparison says: which is right in motion, jumps without a jump of length, and nothing as 0."""
+"""Texts of a comparison: verdicts in motion, jumps of the moment arm alone, and differences of zero."""
 
 from collections import Counter
 
@@ -38,7 +38,7 @@ def test_the_longer_of_two_geodesics_is_explained() -> None:
     _, why = verdict(summary(AGREE=8, OTHER_BRANCH=2), [jump(0.01, 0.02)])
     assert "MuJoCo jumps 1 time, by up to 10 mm, its moment arm by up to 20 mm" in why
     assert "mjwrap's up to 42.3 mm longer" in why
-    assert "keeps it along a sweep, as a string cannot pass through the cylinder" in why
+    assert "keeps it along a sweep, because a string cannot pass through the cylinder" in why
 
 
 def test_a_jump_of_the_moment_arm_alone_is_called_that() -> None:

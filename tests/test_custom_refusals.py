@@ -1,4 +1,4 @@
-"""What cannot be a surface is refused, by name and with advice."""
+"""User functions that cannot be a surface are refused, with their name and with advice."""
 
 from __future__ import annotations
 
@@ -83,20 +83,20 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "arguments": (lambda x, y: x + y, r"phi is called with 3 numbers, but <lambda> takes \(x, y\)"),
     "no source": (
         eval("lambda x, y, z: x + y + z"),
-        "is not found.*Write the function in a file, or give its source as text",
+        "was not found.*Write the function in a file, or give its source as text",
     ),
     "no text": ("x + y", "defines no function|does not run"),
     "wrong text": ("def phi(x, y, z) return x", "does not run"),
-    "branches": (branching, "it branches on its arguments.*write them yourself"),
-    "min": (lambda x, y, z: min(x, y, z), "min has none everywhere"),
-    "floor": (lambda x, y, z: math.floor(x) + y + z, r"math\.floor has none everywhere"),
+    "branches": (branching, "it contains a branch that depends on its arguments.*write them yourself"),
+    "min": (lambda x, y, z: min(x, y, z), "min is not differentiable everywhere"),
+    "floor": (lambda x, y, z: math.floor(x) + y + z, r"math\.floor is not differentiable everywhere"),
     "crease": (lambda x, y, z: abs(x) + y * y + z * z - 1e-3, "has a crease at x = 0"),
     "complex": (lambda x, y, z: x**2.5 + y + z, "power of a negative number"),
     "tuple": (lambda x, y, z: (x, y, z), "phi must return 1 number, not 3"),
     "not finite": (lambda x, y, z: math.log(x) + y + z, "phi is not finite at"),
     "positive": (
         lambda x, y, z: x * x + y * y + z * z + 1.0,
-        "phi is positive all over the box.*choose `extent`",
+        "phi is positive in the whole box.*choose `extent`",
     ),
     "vanishing": (lambda x, y, z: (x * x + y * y + z * z - 9e-4) ** 3, "gradient"),
 }
@@ -124,14 +124,14 @@ CHARTS: dict[str, tuple[Any, Any, Any, dict[str, Any], str]] = {
         (-0.01, 0.01),
         (-0.01, 0.01),
         {},
-        "which side is outside.*outward=1",
+        "outer side cannot be found.*outward=1",
     ),
     "branches": (
         lambda u, v: (u, v, 0.0 if u > 0.0 else u**4),
         (-1, 1),
         (-1, 1),
         {},
-        "branches on its arguments",
+        "branch that depends on its arguments",
     ),
     "range": (torus, (1.0, 0.0), TURN, {}, "u_range must be two finite numbers, the lower one first"),
     "infinite": (torus, (0.0, math.inf), TURN, {}, "u_range must be two finite numbers"),
@@ -158,7 +158,7 @@ def test_a_wrong_derivative_is_named() -> None:
                 a, b, c = right(x, y, z)
                 return {", ".join(f"{1.001 if i == place else 1.0} * {letter}" for i, letter in enumerate("abc"))}
         """
-        with pytest.raises(GeometryError, match=f"{name} is .*differences say"):
+        with pytest.raises(GeometryError, match=f"{name} is .*differences give"):
             ImplicitSurface(ellipsoid, (0.06, 0.04, 0.03), gradient=wrong, hessian=ellipsoid_hessian)
     for place in (0, 4, 8):
         wrong = f"""
@@ -179,7 +179,7 @@ def test_a_wrong_derivative_is_named() -> None:
                 wrong = (1.001 * x, y, z)
                 return {", ".join("wrong" if i == place else f"d[{i}]" for i in range(5))}
         """
-        with pytest.raises(GeometryError, match=f"x of {name} is .*differences say"):
+        with pytest.raises(GeometryError, match=f"x of {name} is .*differences give"):
             ParametricSurface(torus, TURN, TURN, derivatives=wrong)
     assert torus_derivatives(0.0, 0.0)[0] == pytest.approx((0.0, 0.052, 0.0))
 
@@ -214,7 +214,7 @@ def test_whole_numbers_that_grow_too_large_are_noticed() -> None:
 
     gradient = "def gradient(x, y, z): return 2.0 * x, 2.0 * y, 2.0 * z"
     hessian = "def hessian(x, y, z): return (2.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 2.0)"
-    with pytest.raises(GeometryError, match="compiled, it gives other numbers"):
+    with pytest.raises(GeometryError, match="compiled, it gives different numbers"):
         ImplicitSurface(phi, 0.05, gradient=gradient, hessian=hessian)
 
 

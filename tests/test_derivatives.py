@@ -306,10 +306,10 @@ def test_an_end_point_on_the_surface_has_a_gradient_and_no_stiffness() -> None:
     assert np.abs(on.gradient() - near.gradient()).max() < 1e-5
     assert np.isfinite(near.stiffness()).all()
     for call in (on.stiffness, lambda: on.contact_velocities((0, 0, 0), (0, 0, 0))):
-        with pytest.raises(mw.GeometryError, match="segment that leaves the origin has no length"):
+        with pytest.raises(mw.GeometryError, match="segment that leaves the origin has zero length"):
             call()
     twice = [mw.ViaPoint((1, 0, 0)), mw.ViaPoint((1, 0, 0))]
-    with pytest.raises(mw.GeometryError, match="leaves via point 0 has no length"):
+    with pytest.raises(mw.GeometryError, match="leaves via point 0 has zero length"):
         mw.solve_path((0, 0, 0), (3, 0, 0), twice).stiffness()
 
 

@@ -61,12 +61,12 @@ def test_arrays_of_an_npz_file_become_columns(tmp_path: Path) -> None:
         (V1.replace("nRows=2", "nRows=3"), "its header says nRows=3, but there are 2: is it cut short"),
         (V1.replace("nColumns=3", "nColumns=x"), "nColumns=x, but there are 3"),
         (SIMM.replace("datarows 2", "datarows 9"), "nRows=9, but there are 2"),
-        (V3.replace("double", "Vec3"), "holds Vec3 in its cells"),
+        (V3.replace("double", "Vec3"), "has Vec3 in its cells"),
         (V3.replace("0.5\t3\t4", "0.5\t3"), "line 8: 2 cells where the header has 3"),
         (V3.replace("0.5\t3\t4", "0.5\t3\tx"), "line 8, column 'b': 'x' is not a number"),
         (V3.replace("0.5\t3\t4", "0\t3\t4"), "line 8: time 0 does not come after 0"),
         (V3.replace("0.5\t3\t4", "0.5\t3\tnan"), "line 8, column 'b': nan is not finite"),
-        (V3.replace("\tb\n", "\ta\n"), "a name of its own; look at a"),
+        (V3.replace("\tb\n", "\ta\n"), "a name that no other has; check a"),
         (V3.replace("time", "t"), "no column 'time'"),
         (V3[: V3.index("time")], "no line of names after 'endheader'"),
         (V3[: V3.index("0\t1")], "a header but no rows"),
@@ -112,7 +112,7 @@ def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> No
     path = tmp_path / "t.sto"
     mw.write_table(path, made_up())
     before = path.read_bytes()
-    with pytest.raises(mw.TableError, match="no tabs"):
+    with pytest.raises(mw.TableError, match="must not contain tabs"):
         mw.write_table(path, mw.Table(np.arange(2.0), ("a\tb",), np.zeros((2, 1))))
     assert [p.name for p in tmp_path.iterdir()] == ["t.sto"]
     assert path.read_bytes() == before
@@ -127,7 +127,7 @@ def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> No
     [
         ([0.0, 1.0], ("a",), (2, 2), "do not fit"),
         ([0.0, 0.0], ("a",), (2, 1), "row 2"),
-        ([0.0], ("",), (1, 1), "blank"),
+        ([0.0], ("",), (1, 1), "the empty names"),
     ],
 )
 def test_a_table_fits_together(

@@ -47,7 +47,7 @@ UNKNOWN_CODE = 77
 SIZES_OF_A_MUSCLE = {"max_isometric_force": 50.0, "optimal_fiber_length": 0.1, "tendon_slack_length": 0.1}
 every_surface = pytest.mark.parametrize("kind", SURFACES, ids=lambda kind: kind.__name__)
 every_fiber_law = pytest.mark.parametrize("law", FIBER_LAWS.values(), ids=lambda law: law.__name__)
-compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="MuJoCo calls compiled kernels")  # pyright: ignore
+compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="MuJoCo calls compiled kernels")  # pyright: ignore[reportAttributeAccessIssue]
 
 
 # ------------------------------------------------------------------------------------ traits of surfaces
@@ -193,10 +193,10 @@ def test_a_class_of_an_unknown_kind_is_refused() -> None:
         kind: ClassVar[int] = 99
 
     class Nothing(Surface):
-        dims = (0.1,)  # pyright: ignore
+        dims = (0.1,)  # pyright: ignore[reportAssignmentType]
 
     for surface in (Own(0.1), Nothing()):
-        with pytest.raises(GeometryError, match="the kernels know no surface of kind"):
+        with pytest.raises(GeometryError, match="the kernels have no surface of kind"):
             mw.solve_path((-0.2, 0.0, 0.0), (0.2, 0.0, 0.0), [mw.Obstacle(surface)])
 
 
@@ -232,7 +232,7 @@ def test_every_code_has_one_law() -> None:
 
 @every_fiber_law
 def test_traits_of_a_law_are_those_of_its_curves(law: type[FiberLaw]) -> None:
-    found = law(**SIZES_OF_A_MUSCLE)  # pyright: ignore
+    found = law(**SIZES_OF_A_MUSCLE)  # pyright: ignore[reportArgumentType]
     row = parameter_row(found)
     assert len(row) == laws.PARAMS
     assert row[fiber.LEAST] == law.least * 0.1
@@ -269,8 +269,8 @@ def test_a_law_of_an_unknown_code_is_refused() -> None:
     class Own(mw.DeGrooteFregly2016):
         code: ClassVar[int] = UNKNOWN_CODE
 
-    with pytest.raises(ModelError, match="the kernels know no law of code 77"):
-        mw.simulate_muscle(Own(**SIZES_OF_A_MUSCLE), [0.0, 0.1], 0.2, activation=0.5)  # pyright: ignore
+    with pytest.raises(ModelError, match="the kernels have no law of code 77"):
+        mw.simulate_muscle(Own(**SIZES_OF_A_MUSCLE), [0.0, 0.1], 0.2, activation=0.5)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("what", ["law", "form"])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mjwrap.mjcf import marks, read_model
-from mjwrap.plugin.callbacks import follow
+from mjwrap.plugin.callbacks import sync
 
 XML = """
 <mujoco>
@@ -95,7 +95,7 @@ def forces(model: mujoco.MjModel) -> np.ndarray:
 
 
 def test_the_column_is_the_last_and_muscles_do_not_reach_it() -> None:
-    assert mujoco.mjNGAIN == mujoco.mjNBIAS == mujoco.mjNDYN == marks.COLUMN + 1 == follow.PRM
+    assert mujoco.mjNGAIN == mujoco.mjNBIAS == mujoco.mjNDYN == marks.COLUMN + 1 == sync.PRM
     model = mujoco.MjModel.from_xml_string(XML)
     for prm in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_dynprm):
         assert prm[:, marks.COLUMN].tolist() == [0.0] * len(LIMITS)

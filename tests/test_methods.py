@@ -274,12 +274,12 @@ SCENE: Any = (ORIGIN, INSERTION, [mw.Cylinder(0.01)], np.zeros((1, 3)), np.eye(3
 @pytest.mark.parametrize(
     ("method", "options", "message"),
     [
-        ("newton", {}, "method 'newton' is none of: nr, bfgs, broyden"),
+        ("newton", {}, "method must be one of nr, bfgs, broyden, not 'newton'"),
         ("nr", {"step": 1.0}, "has no option 'step'; options: lam, max_iterations, residual"),
         ("nr", {"lam": -0.1}, "lam must be a finite positive number, not -0.1"),
         ("bfgs", {"step": "line_search"}, "step must be 'armijo' or a finite positive number"),
         ("broyden", {"sigma1": math.nan}, "sigma1 must be a finite positive number, not nan"),
-        ("broyden", {"residual": "h"}, "residual 'h' is none of: tangency, normals_binormals"),
+        ("broyden", {"residual": "h"}, "residual must be one of tangency, normals_binormals, not 'h'"),
     ],
 )
 def test_a_wrong_option_is_named(method: str, options: dict[str, Any], message: str) -> None:
@@ -292,7 +292,7 @@ def test_a_wrong_scene_is_named() -> None:
         solve_chain("nr", ORIGIN, INSERTION, [mw.Cylinder(0.01)], np.zeros((2, 3)), np.eye(3)[None])
     with pytest.raises(mw.GeometryError, match="origin must be finite"):
         solve_chain("nr", np.full(3, np.nan), *SCENE[1:])
-    with pytest.raises(mw.GeometryError, match="know Cylinder and Sphere, not Surface"):
+    with pytest.raises(mw.GeometryError, match="support only Cylinder and Sphere, not Surface"):
         solve_chain("nr", ORIGIN, INSERTION, [Surface()], np.zeros((1, 3)), np.eye(3)[None])
     with pytest.raises(mw.GeometryError, match=r"start s must have shape \(1,\)"):
         start = (np.zeros((1, 3)), np.ones((1, 3)), np.zeros(2), np.ones(1, dtype=bool))

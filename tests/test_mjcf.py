@@ -173,23 +173,23 @@ STAYS_NATIVE = {
     "bias": (
         EXTENSOR,
         f'<general name="m" tendon="extensor" gaintype="muscle" biastype="affine" {CURVES}/>',
-        "bias is not a muscle's",
+        "bias is not that of a muscle",
     ),
     "early": (
         EXTENSOR,
         f'<general name="m" tendon="extensor" gaintype="muscle" dyntype="user" actdim="1" actearly="true" {CURVES}/>',
-        "other dynamics than",
+        "its dynamics are not integrator",
     ),
     "early with a delay": (
         EXTENSOR,
         '<general name="m" tendon="extensor" gaintype="muscle" dyntype="filter" actearly="true" delay="0.01"'
         f' nsample="8" {CURVES}/>',
-        "early (actearly) and its control with a delay",
+        "it has actearly, and its control has a delay",
     ),
     "delay": (
         EXTENSOR,
         f'<general name="m" tendon="extensor" gaintype="muscle" delay="0.01" nsample="8" {CURVES}/>',
-        "with a delay",
+        "its control has a delay",
     ),
 }
 

@@ -80,7 +80,7 @@ def test_neither_sites_nor_a_tendon() -> None:
     made = compiled(
         actuator='<motor name="extensor" joint="elbow"/>', custom=declared(ACTUATOR, {"optimal_force": 1.0})
     )
-    assert "tuple 'mjwrap_m': it has neither sites of its own nor a tendon" in message(made)
+    assert "tuple 'mjwrap_m': it has neither sites nor a tendon" in message(made)
 
 
 def test_a_fixed_tendon_has_no_path() -> None:
@@ -170,7 +170,7 @@ def test_a_parameter_without_sense(key: str, value: float, wanted: str) -> None:
 def test_activation_time_constants() -> None:
     values = HILL | {"activation_time_constants": (0.01, 0.04)}
     text = message(compiled(custom=declared(ACTUATOR, values)))
-    assert "activation_time_constants is for muscles whose activation mjwrap integrates" in text
+    assert "activation_time_constants is only for muscles whose activation mjwrap integrates" in text
     model = compiled(actuator="", custom=declared([element("tendon", "extensor")], values))
     model.numeric("mjwrap_m_activation_time_constants").data[1] = 0.0
     assert "activation_time_constants must be finite and positive [s], not 0.01 and 0.0" in message(model)
@@ -259,11 +259,11 @@ def test_two_actuators_or_two_tendons_in_a_tuple() -> None:
     second = MUSCLE.replace('name="extensor"', 'name="second"')
     custom = declared([*ACTUATOR, element("actuator", "second")], HILL)
     text = message(compiled(actuator=MUSCLE + second, custom=custom))
-    assert "tuple 'mjwrap_m': at most one actuator makes a muscle, not 2: extensor, second" in text
+    assert "tuple 'mjwrap_m': a muscle can have only one actuator, not 2: extensor, second" in text
     tendon = EXTENSOR + EXTENSOR.replace('name="extensor"', 'name="second"')
     custom = declared([element("tendon", "extensor"), element("tendon", "second")], HILL)
     text = message(compiled(tendon=tendon, custom=custom))
-    assert "at most one tendon makes a muscle, not 2: extensor, second" in text
+    assert "a muscle can have only one tendon, not 2: extensor, second" in text
 
 
 @pytest.mark.parametrize(("kind", "name"), [("body", "hand"), ("joint", "wrist"), ("tuple", "others")])
@@ -279,13 +279,16 @@ def test_elements_of_other_types(kind: str, name: str) -> None:
 UNFIT = {
     "servo": (
         '<dcmotor name="extensor" tendon="extensor" motorconst="1" resistance="1"/>',
-        "neither fixed, affine",
+        "is not fixed, affine",
     ),
     "early": (
         '<general name="extensor" tendon="extensor" dyntype="user" actdim="1" actearly="true"/>',
-        "its activation acts early (actearly) and has other dynamics",
+        "it has actearly, and its dynamics are not",
     ),
-    "delay": ('<motor name="extensor" tendon="extensor" delay="0.01" nsample="8"/>', "acts with a delay"),
+    "delay": (
+        '<motor name="extensor" tendon="extensor" delay="0.01" nsample="8"/>',
+        "its control has a delay",
+    ),
 }
 
 

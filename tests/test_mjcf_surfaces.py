@@ -263,7 +263,7 @@ CASES = {
         [element("geom", "elbow", 1), element("numeric", "a_torus_size")],
         ["geom 'elbow' has prm=1", "declared by a numeric"],
     ),
-    "strange prm": ([element("geom", "elbow", 3)], ["geom 'elbow' has prm=3", "1 one as long as it is drawn"]),
+    "strange prm": ([element("geom", "elbow", 3)], ["geom 'elbow' has prm=3", "1 a cylinder as long as it is drawn"]),
 }  # fmt: skip
 
 
@@ -369,4 +369,4 @@ def test_a_mesh_whose_frame_was_moved_carries_no_surface(how: str) -> None:
     with pytest.raises(mw.ModelError) as caught:
         read_declarations(with_mesh(MOVED[how], element("numeric", "a_torus_size")))
     assert "geom 'bone' is a mesh whose frame MuJoCo has moved" in str(caught.value)
-    assert "'a_torus_size' would not stand where the file says" in str(caught.value)
+    assert "'a_torus_size' would not be where the file says" in str(caught.value)

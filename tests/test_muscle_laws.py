@@ -1,4 +1,4 @@
-"""What must hold for every muscle with a fibre: both laws, in real sizes and far beyond them."""
+"""Properties of every muscle with a fibre, for both laws, in realistic and extreme sizes."""
 
 from __future__ import annotations
 

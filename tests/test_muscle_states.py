@@ -269,10 +269,10 @@ WRONG = {
     "no place for a fibre": (MUSCLE, {"tendon_model": "elastic"}, {}, "dyntype='user' actdim='2'"),
     "no such tendon": (HOLDER, {"tendon_model": "stretchy"}, {}, "rigid, elastic"),
     "no such dynamics": (HOLDER, {"activation_dynamics": "fast"}, {}, "there are: zajac, degroote_fregly_2016"),
-    "dynamics of the actuator": (MUSCLE, {"activation_dynamics": "zajac"}, {}, "its actuator's own dynamics"),
+    "dynamics of the actuator": (MUSCLE, {"activation_dynamics": "zajac"}, {}, "the dynamics of its actuator"),
     "smoothing": (HOLDER, {}, {"activation_smoothing": 0.0}, "smoothing must be finite and positive"),
     "limited states": (
-        HOLDER.replace("actdim", 'actlimited="true" actrange="0 1" actdim'), {}, {}, "would clamp the fibre"
+        HOLDER.replace("actdim", 'actlimited="true" actrange="0 1" actdim'), {}, {}, "would limit the fibre"
     ),
 }  # fmt: skip
 
@@ -374,12 +374,12 @@ def test_what_does_not_pull_has_no_energetics() -> None:
 def test_states_advance_only_after_an_applied_step() -> None:
     model = elastic()
     muscles, data = mw.MuscleSystem(model), start(model)
-    with pytest.raises(mw.StateError, match="nothing to advance"):
+    with pytest.raises(mw.StateError, match="no step to advance"):
         muscles.advance(data)
     muscles.step(data, nstep=3)
     muscles.apply(data)
     mujoco.mj_resetData(model, data)
-    with pytest.raises(mw.StateError, match="nothing to advance"):
+    with pytest.raises(mw.StateError, match="no step to advance"):
         muscles.advance(data)
     assert not data.act.any()
 

@@ -1,4 +1,4 @@
-"""What MuscleSystem does where a path cannot be found, and where a state is not finite."""
+"""MuscleSystem if a path cannot be found, and if a state is not finite."""
 
 from __future__ import annotations
 
@@ -259,5 +259,5 @@ def test_an_excitation_that_is_not_finite_is_named() -> None:
 def test_data_of_another_model_is_refused() -> None:
     data, _, _ = scene()
     _, muscles, _ = scene()
-    with pytest.raises(mw.StateError, match="another model"):
+    with pytest.raises(mw.StateError, match="a different model"):
         muscles.step(data)

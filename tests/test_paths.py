@@ -377,11 +377,14 @@ def wrong(value: Any) -> Any:
         (lambda: mw.solve_path((0, 0, np.nan), (1, 0, 0)), "origin must be finite"),
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [wrong("cylinder")]), r"obstacles\[0\]"),
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], tol=0.0), "tol must be"),
-        (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], method="magic"), "none of: newton"),
+        (
+            lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], method="magic"),
+            "method must be one of newton",
+        ),
         (lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], lam=1.0), "no options"),
         (
             lambda: mw.solve_path((3, 0, 0), (-3, 0, 0), [GOOD], start=mw.solve_path((0, 0, 0), (1, 0, 0))),
-            "other obst",
+            "different obst",
         ),
         (
             lambda: mw.solve_sweep((3, 0, 0), (-3, 0, 0), [GOOD], np.zeros((5, 3)), np.zeros((5, 4))),

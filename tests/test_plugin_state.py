@@ -1,4 +1,4 @@
-"""Where the state of the engine plugin's muscles goes: jumps, copies, inverse dynamics, sleep."""
+"""The state of the engine plugin's muscles after jumps, copies, inverse dynamics and sleep."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the viewer opens with, and which muscles stand together in it."""
+"""The initial layout of the viewer, and the groups of muscles in it."""
 
 import re
 from pathlib import Path

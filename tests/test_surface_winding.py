@@ -1,4 +1,4 @@
-"""What a ring and a cone do to a string: through the hole or round, hooked, bridged; held or slipped off the tip."""
+"""Strings over a torus and a cone: through the hole or round, hooked, bridged; held, or slipped off the tip."""
 
 from __future__ import annotations
 

@@ -281,7 +281,7 @@ def test_a_full_disk_is_an_error(model: mujoco.MjModel, tmp_path: Path, suffix: 
     mujoco.mj_forward(model, data)
     with (
         room_for(100),
-        pytest.raises(mw.RecordingError, match="nothing was kept"),
+        pytest.raises(mw.RecordingError, match=r"no file was written|file was removed"),
         mw.Video(model, tmp_path / f"run{suffix}", **SIZE) as video,
     ):
         video.log(data)

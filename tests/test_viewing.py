@@ -1,4 +1,4 @@
-"""What the plugin draws into a scene is what MuscleSystem computes, as the viewer's options ask for it.
+"""The plugin draws into a scene what MuscleSystem computes, according to the viewer's options.
 
 `mjv_updateScene` fills a scene without any OpenGL; one test renders, where that works.
 """

@@ -1,4 +1,4 @@
-"""What all rooms share in words: tables of text, and errors for numbers that cannot be used."""
+"""Tables of text, and error messages for invalid numbers."""
 
 import numpy as np
 import pytest

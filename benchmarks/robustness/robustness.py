@@ -34,8 +34,8 @@ import mjwrap as mw
 from mjwrap.verification.cases import describe, plain, replay
 from mjwrap.verification.certificate import Case, findings
 from mjwrap.verification.multistart import SHORTER, shortest
+from mjwrap.verification.perturbation import lowest, stiffness_by_differences
 from mjwrap.verification.random_scenes import CLASSES, Maker, Scene
-from mjwrap.verification.shaking import lowest, shaken_stiffness
 
 HINTS = ("good", "random", "none")
 SHAKEN = 0.02  # share of the paths that are shaken
@@ -85,7 +85,7 @@ def _shake(answer: Answer, tally: Tally) -> None:
     if not any(answer.case.contacts):
         return
     try:
-        stiffness = lowest(shaken_stiffness(answer.case))
+        stiffness = lowest(stiffness_by_differences(answer.case))
     except ValueError:  # an arc too short for differences
         return
     tally.shaken += 1

@@ -1,4 +1,4 @@
-"""Muscle parameters from data: length ranges, fibres and tendons that fit them, and implausible parameters."""
+"""Muscle parameters: length ranges, fibres and tendons that fit them, and implausible parameters."""
 
 from mjwrap.calibration.fibers import (
     MUJOCO_RANGE,
@@ -8,7 +8,7 @@ from mjwrap.calibration.fibers import (
     fit_fiber_and_slack,
     hill_from_mujoco,
 )
-from mjwrap.calibration.judge import implausible
+from mjwrap.calibration.plausibility import implausible
 from mjwrap.calibration.ranges import LengthRange, length_ranges
 from mjwrap.calibration.report import Finding, Implausible, ParameterLimits, ParameterReport
 

@@ -1,4 +1,4 @@
-"""Spectral projected gradient ascent (Birgin, Martínez, Raydan 2000, doi 10.1137/S1052623497330963), a step at a time.
+"""Spectral projected gradient ascent (Birgin, Martínez, Raydan 2000, doi 10.1137/S1052623497330963), step by step.
 
 The caller evaluates the function, so that searches that move different joints can share each evaluation of a model.
 """
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Ascent = Generator[Array, tuple[float, Array], None]
 _HALVINGS = 20
-_SUFFICIENT = 1e-4  # Armijo's share of the gain that the gradient promises
+_SUFFICIENT = 1e-4  # Armijo's share of the gain that the gradient predicts
 _FAR = 1e9
-_MEMORY = 8  # steps: a value has to exceed the least of the last so many, not the last one
+_MEMORY = 8  # number of steps: a value must exceed the smallest of the last so many values
 
 
 def ascend(start: Array, project: Callable[[Array], Array], tolerance: float, iterations: int) -> Ascent:
-    """Yield variables (k,) to evaluate; send back the value there, NaN where there is none, and its gradient (k,).
+    """Yield variables (k,) to evaluate; send back the value, NaN if there is none, and its gradient (k,).
 
-    project: onto the allowed set. Ends where the gradient promises less than `tolerance` [value] within the allowed
-    set, where no step along it gains, or after `iterations` steps.
+    project: projects onto the allowed set. The ascent ends when the gradient predicts a gain of less than `tolerance`
+    within the allowed set, when no step along it gains, or after `iterations` steps.
     """
     x = project(start)
     value, gradient = yield x

@@ -14,20 +14,20 @@ from mjwrap.muscles.laws import DeGrooteFregly2016, MuJoCoMuscle
 
 MUJOCO_RANGE = (0.75, 1.05)  # of normalised fibre lengths: MuJoCo's default
 WIDE_RANGE = (0.5, 1.5)  # where the active force-length curve is well above zero
-LEAST_SLACK = 0.05  # share of the shortest length that a tendon is given at least
+LEAST_SLACK = 0.05  # smallest tendon slack length, as a share of the shortest length
 
 
 @dataclass(frozen=True)
 class FiberFit:
-    """Fibre and tendon that take a muscle from its shortest to its longest length.
+    """The fibre and tendon of a muscle between its shortest and its longest length.
 
     Attributes:
         optimal_fiber_length: [m].
         tendon_slack_length: [m].
         pennation_angle: at optimal fibre length [rad].
         fiber_range: normalised fibre lengths at the shortest and the longest musculotendon length, with a rigid tendon.
-        wanted: the fibre range that was asked for.
-        implied_slack_length: the slack length that the wanted range needs [m]; negative if no tendon can have it.
+        wanted: the fibre range that was requested.
+        implied_slack_length: the slack length that the requested range needs [m]; negative if impossible.
     """
 
     optimal_fiber_length: float
@@ -39,15 +39,15 @@ class FiberFit:
 
     @property
     def exact(self) -> bool:
-        """Whether the fibre has the wanted range; otherwise the tendon would be too short or negative for it."""
+        """Whether the fibre has the requested range; otherwise this needs a tendon that is too short or negative."""
         return self.tendon_slack_length == self.implied_slack_length
 
     @property
     def sentence(self) -> str:
-        """What was done, in words."""
+        """The result in words."""
         low, high = self.wanted
         if self.exact:
-            return f"fibre from {low:.4g} to {high:.4g} optimal lengths, as wanted"
+            return f"fibre from {low:.4g} to {high:.4g} optimal lengths, as requested"
         return (
             f"fibre from {low:.4g} to {high:.4g} optimal lengths would need a tendon slack length of "
             f"{1e3 * self.implied_slack_length:.4g} mm; with {1e3 * self.tendon_slack_length:.4g} mm it goes from "
@@ -84,12 +84,14 @@ def fit_fiber_and_slack(
     if not (math.isfinite(longest) and 0.0 < shortest < longest):
         raise ModelError(
             f"lengths must be finite, positive and increasing [m], not {shortest:g} and {longest:g}: does the muscle "
-            "have a path, and a joint that moves it has a range?"
+            "have a path, and does a joint that moves it have a range?"
         )
     if not 0.0 <= pennation_angle < 0.5 * math.pi:
         raise ModelError(f"pennation_angle must be in [0, pi/2) [rad], not {pennation_angle!r}")
     if not 0.0 <= least_slack < 1.0:
-        raise ModelError(f"least_slack must be a share of the shortest length in [0, 1), not {least_slack!r}")
+        raise ModelError(
+            f"least_slack must be a fraction of the shortest length, in [0, 1), not {least_slack!r}"
+        )
     low, high = (float(x) for x in fiber_range)
     height = math.sin(pennation_angle)
     if not (math.isfinite(high) and height < low < high):
@@ -125,12 +127,12 @@ def _widened(short: float, long: float, total: float, height: float) -> float:
 
 @dataclass(frozen=True)
 class HillFit:
-    """A Hill-type muscle in place of MuJoCo's.
+    """A Hill-type muscle that replaces a muscle of MuJoCo.
 
     Attributes:
         muscle: the law with its parameters.
         fiber: the fibre and tendon.
-        notes: what could not be kept, in words.
+        notes: properties that could not be kept, in words.
     """
 
     muscle: DeGrooteFregly2016
@@ -146,7 +148,7 @@ def hill_from_mujoco(
     tendon: str = "rigid",
     least_slack: float = LEAST_SLACK,
 ) -> HillFit:
-    """Return a Hill-type muscle in place of MuJoCo's, with the lengths of the tendon, without gear.
+    """Return a Hill-type muscle that replaces a muscle of MuJoCo, with the tendon's lengths and without gear.
 
     The maximum isometric force is `force`, or scale/acc0 if that is negative, times gear, divided by the cosine of the
     pennation angle, so that the tension at optimal length is MuJoCo's. The fibre covers range[0] to range[1] over the
@@ -160,13 +162,13 @@ def hill_from_mujoco(
         least_slack: least tendon slack length, as in `fit_fiber_and_slack`; replaces a negative one.
 
     Returns:
-        The muscle, its fibre, and notes about what could not be kept.
+        The muscle, its fibre, and notes about properties that could not be kept.
 
     Raises:
         ModelError: a parameter is not possible.
     """
     if law.prm[2] < 0.0 and not law.acc0 > 0.0:
-        raise ModelError(f"force is to be scale/acc0, but acc0 is {law.acc0!r}")
+        raise ModelError(f"force must be scale/acc0, but acc0 is {law.acc0!r}")
     short, long = law.length_range
     optimal = (long - short) / (law.prm[1] - law.prm[0]) / law.gear
     fiber = fit_fiber_and_slack(

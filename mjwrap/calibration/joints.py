@@ -1,4 +1,4 @@
-"""The joints of a model as free variables, each within its range; coupled joints follow."""
+"""The joints of a model as independent variables within their ranges; coupled joints follow."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _BALL = int(_KINDS.mjJNT_BALL)
 class JointSpace:
     """Variables u (k,): 0 to 1 over the range of a hinge or slide; a ball's rotation vector over its largest angle.
 
-    ranges: by joint name, (low, high) [rad or m], (0, largest angle) of a ball; they replace the model's own. Joints
-    without a range (`held`) stay where `base` (nq,) has them, one whose range is a single value stays there, joints
-    that an equality couples follow their leader. `ModelError` for a name or a range that cannot be.
+    ranges: by joint name, (low, high) [rad or m], for a ball (0, largest angle); they replace the model's own. Joints
+    without a range (`held`) stay at their positions in `base` (nq,), joints whose range is a single value stay there,
+    and joints coupled by an equality follow their leaders. Raises `ModelError` for an invalid name or range.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class JointSpace:
         return slice(first, first + 3)
 
     def neutral(self) -> Array:
-        """Return the variables (k,) of the base pose, as near as the ranges allow."""
+        """Return the variables (k,) of the base pose, moved into the ranges."""
         u = np.zeros(self.k)
         u[: len(self.single)] = (self.base[self._qpos_at] - self._low) / self._width
         for b, joint in enumerate(self.balls):
@@ -119,7 +119,7 @@ class JointSpace:
         return found
 
     def moves(self, muscles: list[MuscleDeclaration]) -> tuple[Bools, list[tuple[str, ...]]]:
-        """Return which variables move which muscle (n, k), and the names of the held joints that do."""
+        """Return which variables move which muscle (n, k), and the names of the held joints that would move it."""
         joints = crossed_dofs(self.model, muscles)[:, self.model.jnt_dofadr]
         variables = np.zeros((len(muscles), self.k), dtype=np.bool_)
         held: list[tuple[str, ...]] = []
@@ -135,7 +135,7 @@ class JointSpace:
 def _spans(
     model: mujoco.MjModel, ranges: Mapping[str, tuple[float, float]], followers: Mapping[int, int]
 ) -> dict[int, tuple[float, float]]:
-    """Return the range of every joint that has one, by joint id."""
+    """Return the range of every joint with a range, by joint id."""
     known = names(model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt)
     spans = {
         j: (float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1]))
@@ -144,7 +144,9 @@ def _spans(
     }
     for name, (low, high) in ranges.items():
         if name not in known:
-            raise ModelError(f"no joint '{name}' to give a range; joints: {', '.join(known) or 'none'}")
+            raise ModelError(
+                f"there is no joint '{name}' for which a range is given; joints: {', '.join(known) or 'none'}"
+            )
         joint = known.index(name)
         if int(model.jnt_type[joint]) not in (*_SINGLE, _BALL):
             raise ModelError(f"joint '{name}' is free: it has no range")
@@ -168,7 +170,7 @@ def _right_jacobian(turn: Array) -> Array:
     angle = float(np.linalg.norm(turn))
     x, y, z = turn.tolist()
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-4:  # its series; what is left out is below 1e-13
+    if angle < 1e-4:  # its series; the remainder is below 1e-13
         return np.eye(3) - 0.5 * cross + cross @ cross / 6.0
     first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return np.eye(3) - first * cross + second * cross @ cross

@@ -19,13 +19,13 @@ from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-TOLERANCE = 1e-6  # of the muscle's length: a search ends where the gradient promises less within all ranges
+TOLERANCE = 1e-6  # relative to the muscle's length: a search ends if the gradient predicts a smaller gain
 ITERATIONS = 200
 
 
 @dataclass(frozen=True)
 class LengthRange:
-    """How short and how long a muscle gets over the ranges of the joints that move it.
+    """The shortest and longest length of a muscle over the ranges of the joints that move it.
 
     Attributes:
         muscle: its name.
@@ -33,9 +33,9 @@ class LengthRange:
         longest: longest length [m]; NaN if no pose had a path.
         shortest_pose: (nq,) qpos at the shortest length.
         longest_pose: (nq,) qpos at the longest length.
-        poses: number of evaluated poses that moved this muscle or were drawn for all.
+        poses: number of evaluated poses in which this muscle was moved.
         without_path: number of these without a path, by status.
-        held: joints without a range that would move the muscle; they stayed as in the base pose.
+        held: joints without a range that would move the muscle; they stay as in the base pose.
     """
 
     muscle: str
@@ -49,7 +49,7 @@ class LengthRange:
 
 
 class _Lengths:
-    """Lengths of all muscles at poses that need not be near each other, and the extremes found so far."""
+    """The lengths of all muscles at arbitrary poses, and the extremes found so far."""
 
     def __init__(self, muscles: MuscleSystem, space: JointSpace) -> None:
         self.space = space
@@ -64,7 +64,7 @@ class _Lengths:
         """Return lengths (n,), NaN without a path, ∂l/∂q (n, nv) if asked for, and d(pose)/du (nv, k)."""
         muscles, data = self.muscles, self._data
         data.qpos[:] = self.space.pose(u)
-        muscles.reset(data)  # so that a length depends on its pose alone, not on the poses before
+        muscles.reset(data)  # so that a length depends only on its pose, not on previous poses
         if gradients:
             jacobian = muscles.length_jacobian(data)
             tangent = self.space.tangent(u, data.qpos)
@@ -84,7 +84,7 @@ class _Lengths:
 
 
 class _Search:
-    """One ascent: of the length of a muscle (sign 1) or of its negative (−1), in the variables that move it."""
+    """One search: for the longest (sign 1) or shortest (-1) length of a muscle, over the variables that move it."""
 
     def __init__(self, space: JointSpace, muscle: int, sign: float, start: Array, moved: Bools) -> None:
         self.muscle, self.sign, self.moved = muscle, sign, moved
@@ -94,7 +94,7 @@ class _Search:
         self.at = start[moved]
 
     def begin(self, length: float) -> None:
-        """Take the first place to evaluate."""
+        """Set the first point to evaluate."""
         self._ascent = ascend(self.at, self._project, TOLERANCE * length, ITERATIONS)
         self.at = next(self._ascent)
 
@@ -104,7 +104,7 @@ class _Search:
         return self._space.project(u)[self.moved]
 
     def advance(self, length: float, gradient: Array) -> bool:
-        """Take the length and its gradient (k,) at the last place; return whether there is another."""
+        """Receive the length and its gradient (k,) at the last point; return whether there is another point."""
         assert self._ascent is not None
         try:
             self.at = self._ascent.send((self.sign * length, self.sign * gradient[self.moved]))
@@ -125,16 +125,16 @@ def length_ranges(
 ) -> dict[str, LengthRange]:
     """Find the shortest and the longest length of every muscle over the ranges of all joints that move it.
 
-    The joints are moved together. Seeded poses are drawn, half of them in corners of the ranges. From the best of
-    them the length is maximised and minimised along its gradient; a muscle has no more such searches in each
-    direction than variables that move it. Joints that are coupled by equality constraints follow. A search cannot
-    prove that there is no longer path; more starts and samples make it less likely. Neither the model nor `muscles`
+    The joints are moved together. Random poses are drawn, half of them in corners of the ranges. From the best of
+    them the length is maximised and minimised along its gradient, in each direction with at most as many searches as
+    there are variables that move the muscle. Joints that are coupled by equality constraints follow. A search cannot
+    prove that there is no longer path; more starts and samples make one less likely. Neither the model nor `muscles`
     is changed.
 
     Args:
         muscles: the muscles.
         names: names of muscles; None for all.
-        ranges: (low, high) [rad or m] by joint, or for a ball joint (0, largest angle), instead of the model's.
+        ranges: (low, high) [rad or m] by joint, for a ball joint (0, largest angle), in place of the model's.
         base: (nq,) pose in which joints without a range stay (`LengthRange.held`); qpos0 if None.
         starts: largest number of searches in each direction.
         samples: number of poses drawn for each start.
@@ -176,7 +176,7 @@ def length_ranges(
 def _starts(
     lengths: _Lengths, chosen: list[int], moved: Bools, starts: int, samples: int, rng: np.random.Generator
 ) -> list[_Search]:
-    """Return the searches from the best of `samples` drawn poses, `starts` times; the base pose is one of the first."""
+    """Return the searches: `starts` times from the best of `samples` random poses; the first include the base pose."""
     space, everyone = lengths.space, np.ones(lengths.muscles.n, dtype=np.bool_)
     if not space.k:
         lengths.evaluate(space.neutral(), everyone, gradients=False)
@@ -199,7 +199,7 @@ def _starts(
 
 
 def _climb(lengths: _Lengths, searches: list[_Search]) -> None:
-    """Run all searches; at any time those that move different joints share each evaluation."""
+    """Run all searches; searches that move different joints share evaluations."""
     space = lengths.space
     waiting = sorted(searches, key=lambda s: -int(s.moved.sum()))
     masks = np.array([s.moved for s in waiting]).reshape(len(waiting), space.k)

@@ -1,4 +1,4 @@
-"""The report of implausible parameters: one finding per muscle and kind, and what could not be judged."""
+"""The report of implausible parameters: a finding per muscle and kind, and remarks on what could not be judged."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from mjwrap.calibration.ranges import LengthRange
-from mjwrap.text import aligned
+from mjwrap.text import aligned, counted
 
 
 class Implausible(enum.StrEnum):
-    """What is wrong with a parameter; in brackets what `Finding.value` and `limit` are."""
+    """Kinds of implausible parameters; the comments give `Finding.value` and `Finding.limit`."""
 
     NEGATIVE_TENDON = "negative tendon"  # slack length [m], 0
     SHORT_TENDON = "short tendon"  # slack length in optimal fibre lengths
@@ -29,14 +29,14 @@ class Implausible(enum.StrEnum):
 
 @dataclass(frozen=True)
 class ParameterLimits:
-    """What counts as plausible.
+    """The limits of plausible values.
 
     Args:
-        fiber: least and largest normalised fibre length.
-        tendon: least and largest slack length in optimal fibre lengths; about 0.1 to 12 in people.
+        fiber: smallest and largest normalised fibre length.
+        tendon: smallest and largest slack length in optimal fibre lengths; about 0.1 to 12 in humans.
         passive: largest tension without activation at rest, in maximum isometric forces.
         excess: largest excess of the path over the declared length range, as a share of the range.
-        force: least and largest maximum isometric force [N].
+        force: smallest and largest maximum isometric force [N].
     """
 
     fiber: tuple[float, float] = (0.4, 1.6)
@@ -51,9 +51,9 @@ class Finding:
     """One implausible parameter.
 
     Attributes:
-        muscle: its name.
-        kind: what is wrong.
-        value: the value that is beyond the limit, in the unit that `Implausible` gives.
+        muscle: name of the muscle.
+        kind: the kind of fault.
+        value: the value beyond the limit, in the unit given in `Implausible`.
         limit: the limit, in the same unit.
         sentence: the finding in words.
     """
@@ -71,7 +71,7 @@ class ParameterReport:
 
     Attributes:
         findings: in the order of the muscles.
-        remarks: what could not be judged and why, by muscle.
+        remarks: by muscle, what could not be judged, and why.
         ranges: the length ranges over which the fibres were judged.
     """
 
@@ -84,19 +84,20 @@ class ParameterReport:
         return [finding for finding in self.findings if finding.kind == kind]
 
     def table(self) -> str:
-        """Return a line per finding, then how many there are of each kind, then the remarks."""
+        """Return a line per finding, then the number of findings of each kind, then the remarks."""
         lines = aligned([(f.muscle, f.kind, f.sentence) for f in self.findings], (0, 1, 2))
         counts = Counter(finding.kind for finding in self.findings)
         muscles = len({finding.muscle for finding in self.findings})
         kinds = ", ".join(f"{kind} {counts[kind]}" for kind in Implausible if counts[kind])
         lines.append(
-            f"findings: {len(self.findings)}, muscles with any: {muscles}" + (f" ({kinds})" if kinds else "")
+            f"findings: {len(self.findings)}, in {counted(muscles, 'muscle')}"
+            + (f" ({kinds})" if kinds else "")
         )
         lines += [f"{name}: {remark}" for name, remarks in self.remarks.items() for remark in remarks]
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return findings, remarks and length ranges as plain values, for JSON; a length that is NaN becomes None."""
+        """Return findings, remarks and length ranges as values for JSON; a length that is NaN becomes None."""
         return {
             "findings": [asdict(finding) for finding in self.findings],
             "remarks": {name: list(remarks) for name, remarks in self.remarks.items()},

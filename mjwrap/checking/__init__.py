@@ -1,4 +1,4 @@
-"""Checks of laws that must hold on every model: paths, derivatives, forces, energy, continuity, each with a figure."""
+"""Tests that must pass on every model: paths, derivatives, forces, energy, continuity; each gives its worst error."""
 
 from mjwrap.checking.all_checks import check_model
 from mjwrap.checking.outcome import Check, Checks

@@ -1,4 +1,4 @@
-"""All checks of a model: random poses from a cold start, sweeps of every joint, a short motion."""
+"""Run all checks of a model: at random poses from a cold start, along sweeps of every joint, in a short motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.differences import Neighbourhood, extrapolated_error, orders
 from mjwrap.checking.energy import check_energy
-from mjwrap.checking.forces import balance_check, look_at_forces, power_check, work_check
+from mjwrap.checking.forces import balance_check, evaluate_forces, power_check, work_check
 from mjwrap.checking.outcome import Check, Checks
 from mjwrap.checking.sweeps import Paths, Sweeper
 from mjwrap.errors import ModelError
@@ -31,9 +31,9 @@ def check_model(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Checks:
-    """Check on a model that paths are tangent, that derivatives and forces agree with lengths, and that nothing jumps.
+    """Check the paths, derivatives, forces, continuity and energy of a model's muscles.
 
-    The limits of the checks hold on every model.
+    The limits are the same for every model.
 
     Args:
         model: the model; it is not changed.
@@ -41,18 +41,18 @@ def check_model(
         samples: number of poses of each joint's sweep around the base pose and around the middle of all ranges. Joints
             that are coupled to the swept one follow.
         base: (nq,) base pose; qpos0 if None.
-        seed: of the random poses.
-        progress: called with (name, done, all).
+        seed: seed of the random poses.
+        progress: called with (name, number done, total number).
 
     Returns:
-        The checks, each with its worst figure.
+        The checks, each with its worst error.
 
     Raises:
         ModelError: the model has no muscles.
     """
     muscles, data = MuscleSystem(model), mujoco.MjData(model)
     if not muscles.n:
-        raise ModelError("the model has no muscles along geodesic paths: nothing to check")
+        raise ModelError("the model has no muscles with geodesic paths: nothing to check")
     start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
     maker = PoseMaker(model, start, seed)
     paths = Paths()
@@ -79,10 +79,10 @@ def check_model(
         muscles.excitation = rng.uniform(0.1, 1.0, muscles.n)
         muscles.reset(data)
         measured.append(_derivatives(muscles, data, where, speed, arms, paths))
-        look_at_forces(muscles, data, where, forces)
+        evaluate_forces(muscles, data, where, forces)
     found = np.concatenate([np.empty(0), *measured])
     if found.size:
-        arms.remarks.append(f"differences come to it at order {np.median(found):.2f} (second order is 2)")
+        arms.remarks.append(f"differences converge to it with order {np.median(found):.2f} (expected: 2)")
     data.qvel[:] = 0.0
     sweeper = Sweeper(muscles, data, paths, jumps)
     for k, (each, joint, axis) in enumerate(sweeps):
@@ -99,10 +99,10 @@ def check_model(
 def _derivatives(
     muscles: MuscleSystem, data: mujoco.MjData, where: str, speed: Check, arms: Check, paths: Paths
 ) -> Array:
-    """Compare l̇ and ∂l/∂q at a pose with differences of l; return the orders at which these come to ∂l/∂q."""
+    """Compare l̇ and ∂l/∂q at a pose with differences of l; return the orders with which these converge to ∂l/∂q."""
     model = muscles.model
     jacobian = muscles.length_jacobian(data)
-    paths.look(muscles, where)
+    paths.record(muscles, where)
     velocity, length = muscles.velocity, muscles.length
     around = Neighbourhood(muscles, data)
     size = np.maximum(np.abs(jacobian).max(axis=1, initial=0.0), 1e-3 * length)

@@ -1,4 +1,4 @@
-"""Lengths at poses around a pose, and the derivatives l̇ and ∂l/∂q from their differences."""
+"""Differences of lengths around a pose, to test the derivatives l̇ and ∂l/∂q."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from mjwrap.system import MuscleSystem
 Array = NDArray[np.float64]
 WIDTHS = tuple(
     2.0**-k for k in range(8, 14)
-)  # of central differences: rad, or muscle lengths where something slides
+)  # widths of central differences [rad; relative to the muscles' lengths for slides]
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 class Neighbourhood:
-    """The lengths of all muscles around a pose, on the branches that they have there."""
+    """The lengths of all muscles around a pose, on the branches of that pose."""
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData) -> None:
         self._muscles, self._data = muscles, data
@@ -32,7 +32,7 @@ class Neighbourhood:
         return np.diff(self._muscles.contacts()[1])
 
     def _length(self, direction: Array, step: float) -> Array:
-        """Return lengths (n,) a step away, NaN where a path touches other surfaces there, or is not found."""
+        """Return lengths (n,) a step away; NaN if the path touches other surfaces there, or is not found."""
         muscles, data = self._muscles, self._data
         data.qpos[:] = self._qpos
         mujoco.mj_integratePos(muscles.model, data.qpos, direction, step)
@@ -52,10 +52,10 @@ class Neighbourhood:
 
 
 def extrapolated_error(central: Array, claimed: Array) -> Array:
-    """Return the smallest error (n,) of a derivative against extrapolated differences; NaN where there are none.
+    """Return the smallest error (n,) of a derivative against extrapolated differences; NaN if there are none.
 
-    central (widths, n): error c h² + d h⁴ + rounding / h, so the best width differs; a wrong derivative is wrong at
-    all of them.
+    central (widths, n): their error is c h² + d h⁴ + rounding / h, so the best width differs between muscles. A wrong
+    derivative is wrong at all widths.
     """
     errors = np.abs((4.0 * central[1:] - central[:-1]) / 3.0 - claimed)
     worst = np.where(np.isnan(errors), np.inf, errors).min(axis=0)
@@ -63,7 +63,7 @@ def extrapolated_error(central: Array, claimed: Array) -> Array:
 
 
 def orders(central: Array, claimed: Array, scale: Array) -> Array:
-    """Return log2 of the ratio of errors at neighbouring widths, where these are far above rounding."""
+    """Return log2 of the ratio of errors at neighbouring widths, where these errors are much larger than rounding."""
     errors = np.abs(central - claimed) / scale
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.log2(errors[:-1] / errors[1:])

@@ -1,4 +1,4 @@
-"""Check of energy over a short motion without losses: the work of the muscles is the energy that the skeleton gains."""
+"""Check the energy in a short motion without losses: the skeleton must gain the work of the muscles."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from mjwrap.text import counted
 Array = NDArray[np.float64]
 SECONDS, ACTIVATION, LIMIT = 0.1, 0.1, 1e-6
 TIMESTEPS = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # [s]
-HELD = 1e6  # times the armature: a joint that stands still
+STANDSTILL_FACTOR = 1e6  # factor of the armature with which a joint practically stands still
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return a copy that keeps its energy but for the muscles': no damping, limit, contact, fluid or other actuator.
+    """Return a copy without damping, limits, contacts and fluid, so that only actuators change its energy.
 
-    Hinges and slides get the largest inertia of their kind as armature, so that light ones are as slow as heavy ones.
-    Joints that an equality couples to others get so much more that they stand still: they would leave their places.
+    Hinges and slides get the largest inertia of their kind as armature, so that light ones move as slowly as heavy
+    ones. Joints that an equality couples to others get so much armature that they stand still, because the constraint
+    is disabled.
     """
     model = copy.copy(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -39,18 +40,18 @@ def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
         dofs = np.flatnonzero(kinds == kind)
         model.dof_armature[dofs] += np.max(model.dof_M0[dofs], initial=0.0)
     coupled = [coupling.joint for coupling in read_couplings(model)]
-    model.dof_armature[model.jnt_dofadr[coupled]] *= HELD
+    model.dof_armature[model.jnt_dofadr[coupled]] *= STANDSTILL_FACTOR
     return model
 
 
 def check_energy(model: mujoco.MjModel, qpos: Array) -> Check:
-    """Return how far energy and the muscles' work are apart after a motion from rest at a pose (nq,).
+    """Compare the gain of energy with the muscles' work in a motion from rest at a pose (nq,).
 
-    What is left is the integrator's, which loses its order where a path lifts off; so time steps are halved, some
-    times, until it is below the limit.
+    The remaining difference is the integrator's error, whose order is lower where a path lifts off. So the time step is
+    halved until the difference is below the limit, but only a few times.
     """
     check = Check(
-        "energy", f"energy gained is the muscles' work, {SECONDS:g} s", LIMIT, "of what was exchanged"
+        "energy", f"energy gained is the muscles' work, {SECONDS:g} s", LIMIT, "of the exchanged energy"
     )
     for timestep in TIMESTEPS:
         try:
@@ -66,9 +67,9 @@ def check_energy(model: mujoco.MjModel, qpos: Array) -> Check:
 
 
 def _drift(model: mujoco.MjModel, qpos: Array, timestep: float) -> tuple[float, float]:
-    """Return the gap between energy and work, as a share of what was exchanged, and that [J].
+    """Return the difference of energy and work relative to the exchanged energy, and this energy [J].
 
-    `ModelError` where the model allows no such motion.
+    Raises `ModelError` if the model allows no such motion.
     """
     model = without_losses(model)
     model.opt.timestep = timestep
@@ -76,7 +77,7 @@ def _drift(model: mujoco.MjModel, qpos: Array, timestep: float) -> tuple[float, 
     elastic = [m.name for m in muscles.declarations if m.parameters.states == 2]
     if elastic:
         raise ModelError(
-            f"elastic tendons, whose steps are implicit, in {counted(len(elastic), 'muscle')} ('{elastic[0]}')"
+            f"{counted(len(elastic), 'muscle')} with elastic tendons ('{elastic[0]}'), whose steps are implicit"
         )
     taken = [m.actuator for m in muscles.declarations if m.actuator >= 0]
     others = np.setdiff1d(np.arange(model.nactuator), taken)
@@ -89,7 +90,7 @@ def _drift(model: mujoco.MjModel, qpos: Array, timestep: float) -> tuple[float, 
             muscles.step(data)
         muscles.forward(data)
         for i in np.flatnonzero(muscles.status):
-            raise ModelError(f"'{muscles.names[i]}' has no path on the way: {muscles.reason(int(i))}")
+            raise ModelError(f"'{muscles.names[i]}' has no path during the motion: {muscles.reason(int(i))}")
         each = -muscles.tension * muscles.velocity
         energy.append(_energy(model, data, scratch))
         power.append(float(each.sum()))
@@ -97,7 +98,7 @@ def _drift(model: mujoco.MjModel, qpos: Array, timestep: float) -> tuple[float, 
     done = timestep / 3.0 * (power[0] + power[-1] + 4.0 * sum(power[1:-1:2]) + 2.0 * sum(power[2:-1:2]))
     exchanged = max(moved, float(np.ptp(energy)))
     if exchanged < 1e-9:
-        raise ModelError("nothing moves")
+        raise ModelError("no energy is exchanged")
     return abs(energy[-1] - energy[0] - done) / exchanged, exchanged
 
 

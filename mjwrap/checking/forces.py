@@ -1,4 +1,4 @@
-"""Checks of forces against lengths: virtual work, balance, power."""
+"""Check forces against lengths: virtual work, balance, power."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def work_check() -> Check:
 
 
 def balance_check() -> Check:
-    """Return the check that the forces of every muscle add up to nothing."""
+    """Return the check that the forces and moments of every muscle add up to zero."""
     return Check("balance", "forces and moments of each muscle balance", 1e-12, "of F, of F l")
 
 
@@ -28,12 +28,12 @@ def power_check() -> Check:
     return Check("power", "power of each muscle's forces is -F dl/dt", 1e-9, "of its parts")
 
 
-def look_at_forces(
+def evaluate_forces(
     muscles: MuscleSystem, data: mujoco.MjData, where: str, checks: tuple[Check, Check, Check]
 ) -> None:
-    """Apply the muscles' forces at the state in `data`, from a cold start, and compare.
+    """Apply the muscles' forces at the state in `data`, from a cold start, and record the errors.
 
-    A muscle that would hold its last good force there has none: it pulls nothing.
+    Muscles without a path are left out: after a cold start they have no last valid force.
     """
     work, balance, power = checks
     model = muscles.model
@@ -63,7 +63,7 @@ def look_at_forces(
         each = np.einsum("kj,kj->k", forces, speeds)
         size = max(float(np.abs(each).sum()), 1e-9 * tension[i])
         power.see(abs(float(each.sum()) + tension[i] * velocity[i]) / size, where, [names[i]])
-    muscles.reset(data)  # takes the forces out again
+    muscles.reset(data)  # removes the forces
     jacobian = muscles.length_jacobian(data)
     pull = np.where(good, tension, 0.0)
     scale = float(parts.max(initial=0.0))

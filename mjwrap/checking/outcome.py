@@ -1,4 +1,4 @@
-"""The result of a check: pass or fail, the worst figure, and where it was found."""
+"""The result of a check: pass or fail, the worst error, and its location."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Check:
-    """One law, with the worst figure met so far; it holds while `worst` is at most `limit`.
+    """One check, with the worst error so far; it passes if `worst` is at most `limit`.
 
     Attributes:
-        name: of the check.
-        what: the law in words.
-        limit: largest figure at which it holds.
-        unit: of `worst` and `limit`.
-        worst: largest figure so far.
-        where: where it was found.
-        count: number of figures.
-        skipped: why it could not be judged, or empty.
-        remarks: further notes for the reader.
+        name: name of the check.
+        what: the tested law in words.
+        limit: largest error with which it passes.
+        unit: unit of `worst` and `limit`.
+        worst: largest error so far.
+        where: where this error was found.
+        count: number of measured values.
+        skipped: why the check was not possible, or empty.
+        remarks: further notes.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Check:
     remarks: list[str] = field(default_factory=list)
 
     def see(self, values: Array | float, where: str, names: list[str] | None = None) -> None:
-        """Take figures into account, each named by `names`; those that are NaN were not measured."""
+        """Record measured errors, each named by `names`; NaN means not measured."""
         given = np.atleast_1d(np.asarray(values, dtype=np.float64)).ravel()
         known = np.where(np.isnan(given), -math.inf, given)
         self.count += int((~np.isnan(given)).sum())
@@ -60,29 +60,29 @@ class Check:
 
     @property
     def reason(self) -> str:
-        """Return why it could not be judged."""
-        return self.skipped or ("" if self.count else "nothing to measure")
+        """Return why the check was not possible, or an empty string."""
+        return self.skipped or ("" if self.count else "no values to measure")
 
 
 @dataclass(frozen=True)
 class Checks:
-    """All checks of a model, in order; facts: how many muscles, poses and sweeps they are from."""
+    """All checks of a model, in order; facts: the numbers of muscles, poses and sweeps."""
 
     checks: list[Check]
     facts: dict[str, int]
 
     @property
     def failed(self) -> list[Check]:
-        """Return the laws that do not hold."""
+        """Return the checks that failed."""
         return [check for check in self.checks if check.verdict == "FAIL"]
 
     def table(self) -> str:
-        """Return a line for each check, and its remarks below it."""
+        """Return a line for each check, with its remarks below."""
         rows = []
         for check in self.checks:
             unit = f" {check.unit}" if check.unit else ""
             if check.verdict == "skip":
-                told = f"not judged: {check.reason}"
+                told = f"not tested: {check.reason}"
             elif check.limit == 0.0:
                 told = counted(check.worst, check.unit.removesuffix("s"))
             else:
@@ -95,7 +95,7 @@ class Checks:
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain values."""
+        """Return the checks as values for JSON."""
         found = [
             {**asdict(check), "verdict": check.verdict.lower(), "skipped": check.reason}
             for check in self.checks

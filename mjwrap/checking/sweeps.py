@@ -1,4 +1,4 @@
-"""Checks along sweeps of every joint over its range: jumps of length or slope, and poses without a path."""
+"""Check along sweeps of every joint: jumps of length or slope, and poses without a path."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 
 from mjwrap.checking.outcome import Check
 from mjwrap.paths import Status
+from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.continuity import NARROW
 from mjwrap.poses.joint_sweeps import PoseMaker
-from mjwrap.poses.walking import Walker
 from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 
-MODELS = (Status.ENDPOINT_INSIDE, Status.OUT_OF_RANGE)  # where the model is such that there is no path
+MODELS = (Status.ENDPOINT_INSIDE, Status.OUT_OF_RANGE)  # statuses of poses at which the model allows no path
 
 
 class Paths:
-    """The checks that every evaluated pose takes part in: is there a path, and how well does it meet its surfaces?"""
+    """The checks at every evaluated pose: is there a path, and how tangent is it to its surfaces?"""
 
     def __init__(self) -> None:
         self.tangency = Check("tangency", "tangency error", 1e-10)
@@ -26,8 +26,8 @@ class Paths:
         self._without: dict[Status, dict[str, list[str]]] = {}
         self.poses = 0
 
-    def look(self, muscles: MuscleSystem, where: str) -> None:
-        """Look at the muscles' last evaluation."""
+    def record(self, muscles: MuscleSystem, where: str) -> None:
+        """Record the muscles' last evaluation."""
         status, names = muscles.status, muscles.names
         self.poses += 1
         self.tangency.see(np.where(status == 0, muscles.tangency_error, np.nan), where, names)
@@ -40,34 +40,34 @@ class Paths:
             self._without.setdefault(kind, {}).setdefault(names[i], []).append(told)
 
     def finish(self) -> list[Check]:
-        """Return the checks, with a remark for each muscle without a path somewhere."""
+        """Return the checks, with a remark for each muscle that has no path at some pose."""
         for kind, muscles in self._without.items():
             check = self.inside if kind in MODELS else self.found
             for name, places in sorted(muscles.items(), key=lambda item: -len(item[1])):
                 check.remarks.append(
-                    f"{name}: no path at {len(places)} of {counted(self.poses, 'pose')}; at {places[0]}"
+                    f"{name}: no path at {len(places)} of {counted(self.poses, 'pose')}; first at {places[0]}"
                 )
         return [self.found, self.inside, self.tangency]
 
 
 class Sweeper:
-    """Sweeps one joint after the other, and finds jumps in the lengths and slopes of all muscles."""
+    """Sweep one joint after the other, and find jumps in the lengths and slopes of all muscles."""
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData, paths: Paths, jumps: Check) -> None:
         self._muscles, self._paths, self._jumps = muscles, paths, jumps
-        self._walker = Walker(muscles, data)
+        self._follower = PathFollower(muscles, data)
 
     def sweep(self, maker: PoseMaker, joint: int, axis: int, samples: int) -> None:
-        """Sweep a joint over its range, from the pose around which it is swept."""
+        """Sweep a joint over its range, starting from the base pose."""
         motion, place = maker.sweep(joint, samples, axis), maker.maker(joint, axis)
         name, muscles, beside = motion.name, self._muscles, 2.0 * NARROW * float(np.ptp(motion.at))
-        self._walker.come(maker.base, motion.qpos[0])
-        walk = self._walker.walk(
-            place, motion.at, lambda value: self._paths.look(muscles, f"{name} = {value:.4f}")
+        self._follower.move_to(maker.base, motion.qpos[0])
+        trace = self._follower.trace(
+            place, motion.at, lambda value: self._paths.record(muscles, f"{name} = {value:.4f}")
         )
         self._jumps.count += muscles.n
-        for i, (at, size, turn) in self._walker.jumps(place, walk):
-            before, after = (self._walker.touched(place, walk, i, at + side) for side in (-beside, beside))
+        for i, (at, size, turn) in self._follower.jumps(place, trace):
+            before, after = (self._follower.touched(place, trace, i, at + side) for side in (-beside, beside))
             what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
             self._jumps.worst += 1.0
             self._jumps.remarks.append(

@@ -1,16 +1,18 @@
-"""Check on your own model the laws that hold on every model, pass or fail, each with its worst figure and where.
+"""Test a model: tangency, derivatives, forces, energy, jumps. Prints pass or fail, the worst error and its location.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes. At random poses, from a cold
-start: are paths tangent to their surfaces, are the lengthening speed and the moment arms the derivatives of the length,
-is the generalised force -F dl/dq, do each muscle's forces balance, is their power -F dl/dt? Along sweeps of every
-joint: does a length or a moment arm jump, is there a path everywhere? In a short motion without losses: is the energy
-that the skeleton gains the muscles' work?
+MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+
+At random poses, without a previous path to start from, the command tests that paths are tangent to their surfaces, that
+the lengthening speed and the moment arms are the derivatives of the length, that the generalised force is -F dl/dq,
+that the forces of each muscle balance, and that their power is -F dl/dt. Along sweeps of every joint it tests that
+every path exists, and that no length or moment arm jumps. In a short motion without losses it tests that the energy of
+the skeleton grows by the work of the muscles.
 
 Examples:
   mjwrap check models/elbow/elbow.xml
   mjwrap check myo_sim:myoarm_r --poses 5 --samples 51 --json check.json
 
-Exit code 1 where a law does not hold.
+The exit code is 1 if a test fails.
 """
 
 from __future__ import annotations
@@ -29,20 +31,33 @@ from mjwrap.text import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Say which arguments there are."""
-    add_model(parser, "pose to sweep around", "of the random poses")
+    """Add the arguments of the command."""
+    add_model(parser, "keyframe whose pose the sweeps start from", "seed of the random poses")
     add = parser.add_argument
-    add("--poses", type=at_least(1), default=20, metavar="N", help="random poses (%(default)s)")
-    add("--samples", type=at_least(3), default=101, metavar="N", help="poses of a sweep (%(default)s)")
-    add_json(parser, "verdicts and figures")
+    add(
+        "--poses",
+        type=at_least(1),
+        default=20,
+        metavar="N",
+        help="number of random poses (default %(default)s)",
+    )
+    add(
+        "--samples",
+        type=at_least(3),
+        default=101,
+        metavar="N",
+        help="number of poses along a sweep (default %(default)s)",
+    )
+    add_json(parser, "write the results")
 
 
 @dataclass(frozen=True)
 class CheckSettings:
     """The settings of `mjwrap check`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the pose to sweep around, None for qpos0. poses: random ones, drawn with
-    seed; samples: poses of a sweep. json: a file for the figures, "-" for standard output, or None.
+    model: a file, or "myo_sim:NAME". keyframe: the pose to sweep around, None for qpos0. poses: number of random poses,
+    drawn with seed; samples: number of poses along a sweep. json: a file for the results, "-" for
+    standard output, or None.
     """
 
     model: str
@@ -54,7 +69,7 @@ class CheckSettings:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Check, and return the exit code."""
+    """Run the command and return its exit code."""
     return check(
         CheckSettings(
             options.model, options.keyframe, options.poses, options.samples, options.seed, options.json
@@ -63,7 +78,7 @@ def execute(options: argparse.Namespace) -> int:
 
 
 def check(settings: CheckSettings) -> int:
-    """Check, and say what holds; return the exit code."""
+    """Test a model, print the results, and return the exit code."""
     model = load(settings.model)
     base = start_state(model, start_keyframe(model, settings.keyframe)).qpos
     report = Report(settings.json)

@@ -18,9 +18,9 @@ COMMANDS = {
     "run": "simulate a model with its muscles along geodesic paths",
     "compare": "compare MuJoCo's built-in tendons with mjwrap's paths on the same model",
     "inspect": "list the muscles of a model, what drives them, and which parameters are implausible",
-    "check": "check paths, moment arms, forces and energy on a model, pass or fail",
-    "replay": "look at a recording, or make one from a file of states",
-    "warmup": "compile everything now, so that no run has to",
+    "check": "test the paths, moment arms, forces and energy of a model",
+    "replay": "show a recording, or make one from a table of states",
+    "warmup": "compile everything in advance, so that later commands start faster",
 }
 HELP = """usage: mjwrap COMMAND ...
        mjwrap COMMAND --help
@@ -31,24 +31,26 @@ Geodesic muscles for MuJoCo.
 commands:
 {commands}
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes.
+MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
 
 Examples:
   mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --plot elbow.png
   mjwrap inspect models/elbow/elbow.xml
   mjwrap check models/elbow/elbow.xml
 
-Exit codes: 0 done, 1 faults found or the run failed, 2 a mistake on the command line or in a file, 130 Ctrl-C."""
+Exit codes: 0 done; 1 faults found, or the run failed; 2 a mistake on the command line or in a file; 130 Ctrl-C."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code, as `HELP` lists them."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell
+        if getattr(sys, name) is None:  # where the shell closed standard output
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a name that it has no letters for is no error
+        sys.stdout.reconfigure(
+            errors="backslashreplace"
+        )  # print names in letters that the terminal lacks, too
     try:
         try:
             return _command(given)
@@ -92,6 +94,6 @@ def _execute(name: str, arguments: list[str]) -> int:
     parser = console.Parser(f"mjwrap {name}", command.__doc__ or "")
     command.add_arguments(parser)
     options = parser.parse_args(arguments)
-    options.given = list(arguments)  # as typed, for what says how it was made
+    options.given = list(arguments)  # as typed, for outputs that quote the command
     note_inputs(console.inputs(options))
     return command.execute(options)

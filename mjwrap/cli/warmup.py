@@ -1,7 +1,7 @@
-"""Compile everything now, so that no run has to wait for it: paths, muscles, the engine plugin, recordings.
+"""Compile everything in advance, so that later commands start faster: paths, muscles, the engine plugin, recordings.
 
-The machine code is kept for this user, this version of mjwrap and of numba; a second call finds it there. With MODEL,
-the model is evaluated too, with whatever else it asks for.
+The machine code is kept for this user, this version of mjwrap and this version of numba; later commands load it. With
+MODEL, the code that this model needs is compiled too.
 
 Examples:
   mjwrap warmup
@@ -23,7 +23,7 @@ import numpy as np
 from numba.core import event
 
 import mjwrap as mw
-from mjwrap.cli.common.arguments import add_json
+from mjwrap.cli.common.arguments import MODEL_HELP, add_json
 from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels.compilation import cache_folders
@@ -55,13 +55,13 @@ SCENE = """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Say which arguments there are."""
-    parser.add_argument("model", nargs="?", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
-    add_json(parser, "what was compiled, how long it took, and where it is kept")
+    """Add the arguments of the command."""
+    parser.add_argument("model", nargs="?", metavar="MODEL", help=MODEL_HELP)
+    add_json(parser, "write what was compiled, how long it took, and its folder")
 
 
 class _Count(event.Listener):
-    """Counts the functions that are compiled rather than loaded."""
+    """Count the functions that are compiled, not loaded."""
 
     def __init__(self) -> None:
         self.compiled = 0
@@ -75,19 +75,19 @@ class _Count(event.Listener):
 
 @dataclass(frozen=True)
 class WarmupSettings:
-    """The settings of `mjwrap warmup`: a model to evaluate too, and a file for the report ("-": standard output)."""
+    """The settings of `mjwrap warmup`: a model to compile for, and a file for the report ("-": standard output)."""
 
     model: str | None
     json: str | None
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Compile, and return the exit code."""
+    """Run the command and return its exit code."""
     return warm_up(WarmupSettings(options.model, options.json))
 
 
 def warm_up(settings: WarmupSettings) -> int:
-    """Compile, and say what was done and where the machine code lies."""
+    """Compile, and report what was compiled and the folder of the machine code."""
     report = Report(settings.json)
     model = load(settings.model) if settings.model else None
     count = _Count()
@@ -122,7 +122,7 @@ def warm_up(settings: WarmupSettings) -> int:
 
 
 def paths() -> None:
-    """Solve a path and a sweep, also by the paper's methods, and ask a path for everything."""
+    """Solve a path and a sweep, also by the paper's methods, and compute every property of a path."""
     row = [mw.Obstacle(mw.Cylinder(0.03), hint=(0.0, 0.03, 0.0)), mw.ViaPoint((-0.06, 0.01, 0.01))]
     ends = (0.1, 0.01, 0.0), (-0.2, 0.0, 0.02)
     path = mw.solve_path(*ends, row)
@@ -140,7 +140,7 @@ def paths() -> None:
 
 
 def muscles() -> None:
-    """Evaluate and step a MuscleSystem, and draw one muscle on the bench."""
+    """Evaluate and step a MuscleSystem, and simulate a single muscle."""
     evaluate(mujoco.MjModel.from_xml_string(SCENE))
     law = mw.DeGrooteFregly2016(500.0, 0.1, 0.2, tendon="elastic")
     mw.simulate_muscle(law, [0.0, 0.01, 0.02], 0.3, excitation=0.5)
@@ -166,7 +166,7 @@ def evaluate(model: mujoco.MjModel) -> None:
 
 
 def plugin() -> str:
-    """Run a model by the engine plugin; return why that cannot be, or an empty string."""
+    """Run a model with the engine plugin; return why that is impossible, or an empty string."""
     try:
         model = mw.install(mujoco.MjSpec.from_string(SCENE))
     except VersionError as error:
@@ -176,7 +176,7 @@ def plugin() -> str:
 
 
 def recording() -> str:
-    """Record a state; return why that cannot be, or an empty string."""
+    """Record a state; return why that is impossible, or an empty string."""
     model = mujoco.MjModel.from_xml_string(SCENE)
     system, data = mw.MuscleSystem(model), mujoco.MjData(model)
     with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:

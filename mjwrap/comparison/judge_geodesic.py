@@ -1,9 +1,9 @@
-"""Judges whether given paths over one cylinder or sphere are true geodesics, from the geometry alone, for many poses.
+"""Judge whether given paths over one cylinder or sphere are true geodesics, from their geometry alone, for many poses.
 
-Nothing of mjwrap's solver, nor of MuJoCo's wrapping, is used here. A path from a to b is either straight, or runs
-straight to p, along the surface to q, and straight to b. It is the path of a string if it touches the surface
-tangentially, follows a geodesic between p and q, passes below the surface nowhere, and is a local minimum of length.
-All points are (T, 3) in the surface's frame [m]; the axis of a cylinder is z.
+The code uses neither mjwrap's solver nor MuJoCo's wrapping. A path from a to b is either straight, or runs straight to
+p, along the surface to q, and straight to b. It is the path of a string if it touches the surface tangentially, follows
+a geodesic between p and q, never passes below the surface, and is a local minimum of length. All points are (T, 3) in
+the surface's frame [m]; the axis of a cylinder is z.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 
-ANGLE = 1e-9  # [rad] largest corner; both programs' contact points are closed-form or polished to 1e-10
-HELD = 2e-6  # [rad] the same of MuJoCo's corner inside a geom, which it finds to 1e-6 rad
-DEPTH = 1e-12  # [radii] deepest that a straight segment may pass below a surface, for rounding alone
+ANGLE = 1e-9  # [rad] largest corner; both programs compute contact points in closed form or to 1e-10
+INSIDE_TOLERANCE = 2e-6  # [rad] the same for MuJoCo's corner inside a geom, which it finds to 1e-6 rad
+DEPTH = 1e-12  # [radii] largest depth of a straight segment below a surface, for rounding errors
 
 
 class Fault(enum.IntEnum):
-    """Why a path is not one that a string would take."""
+    """The reason why a path is not that of a string."""
 
     NONE = 0
     NON_FINITE = 1
@@ -41,7 +41,7 @@ class Fault(enum.IntEnum):
 
     @property
     def words(self) -> str:
-        """What is wrong, in one clause; {} is its measure."""
+        """The fault in one clause; {} stands for its measure."""
         return _WORDS[self]
 
 
@@ -53,20 +53,21 @@ _WORDS = {
     Fault.THROUGH: "it passes straight through the surface, {:.2g} m deep",
     Fault.OFF_SURFACE: "its contact points lie {:.2g} m off the surface",
     Fault.CORNER: "it meets the surface with a corner of {:.2g} rad",
-    Fault.NOT_GEODESIC: "what lies on the surface misses the geodesic by {:.2g} m",
-    Fault.LONG_WAY: "it takes the long way round the sphere ({:.2g} rad about its centre), a saddle, not a minimum",
-    Fault.BESIDE: "it is to be held inside, and passes {:.2g} m beside the surface",
+    Fault.NOT_GEODESIC: "its part on the surface differs from the geodesic by {:.2g} m",
+    Fault.LONG_WAY: "it takes the long way round the sphere ({:.2g} rad about its centre), which is not a minimum",
+    Fault.BESIDE: "it should be held inside, but passes {:.2g} m beside the surface",
     Fault.UNEVEN: "held inside, it meets and leaves the surface at angles {:.2g} rad apart, so it is not the shortest",
     Fault.WRONG_LENGTH: "its length differs by {:.2g} m from its own segments and arcs",
 }
 
 
 class Judgement(NamedTuple):
-    """fault (T,) and its measure (T,); arc (T,) on the surface [m]; turn (T,): which branch, see below.
+    """The judgement of paths: fault (T,) and its measure (T,); arc (T,) on the surface [m]; turn (T,): the branch.
 
-    turn is the angle [rad] by which the path goes round a cylinder's axis, counter-clockwise positive. Two paths
-    between the same points are on the same branch if it is the same; else it differs by whole turns. On a sphere: zero.
-    middle (T, 3): from the centre or axis to the middle of the arc, or to the nearest point of a straight path.
+    turn is the angle [rad] by which the path goes round a cylinder's axis, counter-clockwise positive; on a sphere it
+    is zero. Two paths between the same points are on the same branch if their turns are equal; else the turns differ by
+    full turns. middle (T, 3): the vector from the centre or axis to the middle of the arc, or to the nearest point of a
+    straight path.
     """
 
     fault: Ints
@@ -85,7 +86,7 @@ def _dot(u: Array, v: Array) -> Array:
 
 
 def _radial(v: Array, cylinder: bool) -> Array:
-    """Return the part of v at right angles to the axis, or v itself on a sphere."""
+    """Return the part of v perpendicular to the axis, or v itself for a sphere."""
     return v * np.array([1.0, 1.0, 0.0]) if cylinder else v
 
 
@@ -98,7 +99,7 @@ def nearest(a: Array, b: Array, cylinder: bool) -> Array:
 
 
 def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array) -> Judgement:
-    """Judge paths from a to b (T, 3) over one surface; p, q (T, 3) count where `touched` (T,)."""
+    """Judge paths from a to b (T, 3) over one surface; p, q (T, 3) are used where `touched` (T,) is true."""
     with np.errstate(invalid="ignore", divide="ignore"):
         straight = _judge_straight(cylinder, radius, a, b)
         wrapped = _judge_wrapped(cylinder, radius, a, b, p, q)
@@ -128,10 +129,11 @@ def judge_held(
     q: Array,
     angle: float = ANGLE,
 ) -> Judgement:
-    """Judge paths that are held inside: the shortest from a to b that meet the solid; p = q where `touched`.
+    """Judge paths that are held inside: the shortest paths from a to b that meet the solid; p = q where `touched`.
 
-    angle [rad]: by how much the angles at the corner may differ. Straight through it, or with one corner on it where
-    both segments, outside, make the same angle with the normal: the problem is convex, so that is enough.
+    angle [rad]: largest difference of the angles at the corner. Such a path is straight through the solid, or has one
+    corner on it where both segments, which are outside, make the same angle with the normal. The problem is convex, so
+    this is sufficient.
     """
     zeros = np.zeros(len(a))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -146,7 +148,7 @@ def judge_held(
         rounding = 1e-15 * np.maximum(_norm(a), _norm(b)) / np.minimum(near, far)
         off = np.maximum(np.abs(_norm(_radial(p, cylinder)) - radius), _norm(p - q))
         fault, measure = zeros, zeros
-        for here, name, size in (  # the last that holds is the one that is told
+        for here, name, size in (  # the last fault that applies is reported
             (~touched & (beside > DEPTH * radius), Fault.BESIDE, beside),
             (touched & (uneven > angle + 10.0 * rounding), Fault.UNEVEN, uneven),
             (touched & (off > ANGLE * radius), Fault.OFF_SURFACE, off),
@@ -176,7 +178,7 @@ def _judge_straight(cylinder: bool, radius: float, a: Array, b: Array) -> tuple[
 def _judge_wrapped(
     cylinder: bool, radius: float, a: Array, b: Array, p: Array, q: Array
 ) -> tuple[Array, ...]:
-    # The longer straight segment says which way the path arrives; walk from that end to the other.
+    # Start at the end with the longer straight segment, whose direction is the more accurate.
     back = (_norm(p - a) < _norm(b - q))[:, None]
     a, b, p, q = np.where(back, b, a), np.where(back, a, b), np.where(back, q, p), np.where(back, p, q)
     in_length, out_length = _norm(p - a), _norm(b - q)
@@ -201,7 +203,7 @@ def _judge_wrapped(
     swept = np.arctan(reach_a / radius) + np.abs(angle) + np.arctan(reach_b / radius)
 
     fault, measure = np.zeros(len(a)), np.zeros(len(a))
-    for here, name, size in (  # the last that holds is the one that is told
+    for here, name, size in (  # the last fault that applies is reported
         (np.full(len(a), not cylinder) & (swept > np.pi + ANGLE), Fault.LONG_WAY, swept),
         (out > ANGLE + 10.0 * reach, Fault.CORNER, out),
         (miss > ANGLE * radius, Fault.NOT_GEODESIC, miss),
@@ -217,13 +219,13 @@ def _judge_wrapped(
 
 
 def _once_round(angle: Array) -> Array:
-    """Return the angle in [0, 2π), but rounding just below zero as zero."""
+    """Return the angle in [0, 2π); an angle just below zero by rounding becomes zero."""
     angle = np.mod(angle, 2.0 * np.pi)
     return np.where(angle > 2.0 * np.pi - 1e-9, 0.0, angle)
 
 
 def _walk_sphere(radius: float, p: Array, n: Array, t: Array, q: Array) -> tuple[Array, Array, Array, Array]:
-    """Follow the great circle from p along t until it is nearest to q: arc, angle, end, tangent there."""
+    """Follow the great circle from p along t to its point nearest to q; return arc, angle, end, and tangent there."""
     angle = _once_round(np.arctan2(_dot(q, t), _dot(q, n)))
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return radius * angle, angle, radius * (cos * n + sin * t), cos * t - sin * n
@@ -232,7 +234,7 @@ def _walk_sphere(radius: float, p: Array, n: Array, t: Array, q: Array) -> tuple
 def _walk_cylinder(
     radius: float, p: Array, n: Array, t: Array, q: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Follow the helix from p along t as far round as q: arc, angle (signed), end, tangent there."""
+    """Follow the helix from p along t to the angle of q; return arc, angle (signed), end, and tangent there."""
     round_p = np.stack([-n[:, 1], n[:, 0], np.zeros(len(p))], axis=1)  # unit, counter-clockwise about z
     along = _dot(t, round_p)
     sense = np.where(along >= 0.0, 1.0, -1.0)
@@ -249,8 +251,8 @@ def _walk_cylinder(
 def closed_form_length(cylinder: bool, radius: float, a: Array, b: Array, side: int = 1) -> Array:
     """Return the length (T,) of the shortest string from a to b that passes the axis on the given side [m].
 
-    side: +1 with the axis on the left of travel, -1 on the right; a sphere has only one minimum. nan where an end
-    point lies inside. Tangents and one arc in closed form (obstacle-set method, Garner & Pandy 2000).
+    side: +1 with the axis to the left of the path's direction, -1 to the right; a sphere has only one minimum. nan if
+    an end point lies inside. Tangents and arc are in closed form (obstacle-set method, Garner & Pandy 2000).
     """
     ra, rb = _norm(_radial(a, cylinder)), _norm(_radial(b, cylinder))
     with np.errstate(invalid="ignore"):

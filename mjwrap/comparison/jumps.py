@@ -1,4 +1,4 @@
-"""Jumps of length or slope of both programs along a sweep."""
+"""Find the jumps of length or slope of both programs along a sweep."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mjwrap.comparison.judge_geodesic import Fault
-from mjwrap.comparison.twins import Batch, Comparer, PathRecord, Twin
+from mjwrap.comparison.paired_evaluation import Batch, Comparer, MusclePair, PathRecord
 from mjwrap.comparison.verdict import slope
-from mjwrap.poses.continuity import NARROW, odd_intervals, refine_jump
+from mjwrap.poses.continuation import Found, Place
+from mjwrap.poses.continuity import NARROW, jump_candidates, refine_jump
 from mjwrap.poses.joint_sweeps import PoseMaker, PoseSequence
-from mjwrap.poses.walking import Found, Place
 from mjwrap.text import counted
 
 
@@ -21,8 +21,8 @@ class Jump:
 
     Attributes:
         program: "MuJoCo" or "mjwrap".
-        muscle: its name.
-        sweep: what was swept.
+        muscle: name of the muscle.
+        sweep: the joint that was swept.
         at: value of the joint at the jump [rad or m].
         length: change of length [m].
         slope: change of slope [m/rad or m/m].
@@ -30,7 +30,7 @@ class Jump:
         after: the path after the jump, in words.
         base: number of the pose around which the joint was swept.
         other_smooth: whether the other program had a path there that did not jump.
-        alone: whether the joint is coupled to another one, so that no motion leads there.
+        alone: whether a coupled joint was moved alone, which no motion of the model does.
     """
 
     program: str
@@ -47,53 +47,53 @@ class Jump:
 
     @property
     def where(self) -> str:
-        """Where it is, with a star where the joint was moved alone."""
+        """The place of the jump as text, with a star if the joint was moved alone."""
         return f"{self.sweep}{' *' * self.alone} = {self.at:.6f}"
 
 
 def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, axis: int = 0) -> list[Jump]:
-    """Return the jumps of both programs along a sweep of one joint that has been evaluated."""
+    """Return the jumps of both programs along an evaluated sweep of one joint."""
     motion, place = batch.motion, poses.maker(joint, axis)
     span, found = float(np.ptp(motion.at)), list[Jump]()
-    mine = [twin.index for twin in batch.twins if twin.mjwrap is not None]
-    own = comparer.walker.jumps(place, batch.walk, mine)
-    for twin in batch.twins:
-        told = [("MuJoCo", jump) for jump in _native_jumps(comparer, twin, place, motion)]
-        told += [("mjwrap", jump) for i, jump in own if i == twin.index]
+    mine = [pair.index for pair in batch.pairs if pair.mjwrap is not None]
+    own = comparer.follower.jumps(place, batch.trace, mine)
+    for pair in batch.pairs:
+        told = [("MuJoCo", jump) for jump in _native_jumps(comparer, pair, place, motion)]
+        told += [("mjwrap", jump) for i, jump in own if i == pair.index]
         for program, jump in told:
-            before, after = _sides(comparer, twin, program, place, jump[0], span)
-            told_as = program, twin.name, motion.name, *jump, before, after, motion.base
+            before, after = _sides(comparer, pair, program, place, jump[0], span)
+            told_as = program, pair.name, motion.name, *jump, before, after, motion.base
             found.append(Jump(*told_as, alone=motion.alone))
-    return [_beside(jump, found, batch) for jump in found]
+    return [_with_other_smooth(jump, found, batch) for jump in found]
 
 
-def _beside(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
-    """Note whether the other program was smooth where this one jumps."""
-    (twin,) = (twin for twin in batch.twins if twin.name == jump.muscle)
+def _with_other_smooth(jump: Jump, found: list[Jump], batch: Batch) -> Jump:
+    """Set whether the other program is smooth at a jump."""
+    (pair,) = (pair for pair in batch.pairs if pair.name == jump.muscle)
     k = int(np.clip(np.searchsorted(batch.motion.at, jump.at), 1, len(batch.motion.at) - 1))
     jumps_too = any(
         other.program != jump.program and other.muscle == jump.muscle and abs(other.at - jump.at) < 1e-6
         for other in found
     )
-    has_path = twin.mjwrap is not None and not twin.status[k - 1 : k + 1].any()
+    has_path = pair.mjwrap is not None and not pair.status[k - 1 : k + 1].any()
     return replace(jump, other_smooth=has_path and not jumps_too)
 
 
-def _native_jumps(comparer: Comparer, twin: Twin, place: Place, motion: PoseSequence) -> list[Found]:
-    """Return the jumps of MuJoCo's tendon, whose path depends on the pose alone."""
+def _native_jumps(comparer: Comparer, pair: MusclePair, place: Place, motion: PoseSequence) -> list[Found]:
+    """Return the jumps of MuJoCo's tendon, whose path depends only on the pose."""
 
     def probe(at: float) -> tuple[float, float]:
         qpos, tangent = place(at)
         length, _, jacobian = comparer.native_at(qpos, np.zeros_like(tangent))
-        return float(length[twin.tendon]), float(jacobian[twin.tendon] @ tangent)
+        return float(length[pair.tendon]), float(jacobian[pair.tendon] @ tangent)
 
     found: list[Found] = []
     length, slopes, good = (
-        twin.native.length,
-        slope(twin.native, motion),
+        pair.native.length,
+        slope(pair.native, motion),
         np.ones(len(motion.at), dtype=np.bool_),
     )
-    for k, bend in odd_intervals(motion.at, length, slopes, good):
+    for k, bend in jump_candidates(motion.at, length, slopes, good):
         jump = refine_jump(
             probe, float(motion.at[k]), float(motion.at[k + 1]), float(np.ptp(motion.at)), bend
         )
@@ -104,18 +104,18 @@ def _native_jumps(comparer: Comparer, twin: Twin, place: Place, motion: PoseSequ
 
 def _sides(
     comparer: Comparer,
-    twin: Twin,
+    pair: MusclePair,
     program: str,
     place: Place,
     at: float,
     span: float,
 ) -> tuple[str, str]:
-    """Say what the path was on either side of a jump."""
+    """Describe the path on either side of a jump."""
     ends = [place(at - 2.0 * NARROW * span), place(at + 2.0 * NARROW * span)]
     qpos, tangent = (np.array(part) for part in zip(*ends, strict=True))
     motion = PoseSequence("", np.arange(2.0), qpos, tangent, np.zeros_like(tangent), False)
-    for again in comparer.evaluate(motion).twins:
-        if again.name == twin.name:
+    for again in comparer.evaluate(motion).pairs:
+        if again.name == pair.name:
             record = again.native if program == "MuJoCo" else again.mjwrap
             if record is not None:
                 return _words(record, 0), _words(record, 1)
@@ -123,7 +123,7 @@ def _sides(
 
 
 def _words(record: PathRecord, k: int) -> str:
-    """Say what a path is at pose k: which surfaces it touches, and whether it is a true geodesic."""
+    """Describe a path at pose k: the surfaces that it touches, and whether it is a true geodesic."""
     touched = int(record.touched[k].sum())
     text = f"{counted(touched, 'surface')} touched" if touched else "straight"
     if record.fault[k]:

@@ -1,4 +1,4 @@
-"""Forward dynamics of a model twice, along MuJoCo's tendons and along mjwrap's paths, with the same controls."""
+"""Simulate a model twice with the same controls, along MuJoCo's tendons and along mjwrap's paths."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MotionDifference:
         mjwrap: (T, nq) positions with mjwrap's paths.
         difference: (T, nv) mjwrap minus MuJoCo, by degree of freedom.
         dofs: names of the degrees of freedom.
-        places: (nv,) the entry of qpos that shows a degree of freedom; for balls and free joints the joint's first.
+        places: (nv,) index in qpos of each degree of freedom; for ball and free joints that of the joint's first.
         stopped: why a run ended early, or empty.
         paths: mjwrap's report of muscles without a path.
     """
@@ -64,20 +64,20 @@ class MotionDifference:
 
 
 def unstable(data: mujoco.MjData) -> bool:
-    """Return whether MuJoCo found the state bad and reset it, which it does without an exception."""
+    """Return whether MuJoCo has reset an unstable state, which it does without an exception."""
     return any(int(data.warning[kind].number) for kind in _UNSTABLE)
 
 
 def pristine(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return a copy in which every native actuator pulls, though a `MuscleSystem` may hold the original's still."""
+    """Return a copy in which every native actuator pulls, even if a `MuscleSystem` drives the original."""
     with Takeover(model).original_limits():
         return copy.copy(model)
 
 
 def with_native_laws(model: mujoco.MjModel) -> tuple[mujoco.MjModel, list[str]]:
-    """Return a copy whose muscles all have MuJoCo's own curves, and the names of those that had another law.
+    """Return a copy in which all muscles have MuJoCo's curves, and the names of the muscles that had another law.
 
-    So both runs differ by the path alone. Muscles whose actuator has no muscle curves keep their law.
+    So only the paths differ in both simulations. Muscles whose actuator has no muscle curves keep their law.
     """
     model = pristine(model)
     dropped = (int(mujoco.mjtObj.mjOBJ_NUMERIC), int(mujoco.mjtObj.mjOBJ_TEXT))
@@ -120,7 +120,7 @@ def compare_motion(
         entries: excitations, as `Excitation` takes them.
         duration: of the run [s].
         key: a keyframe to start from, or -1.
-        qpos: (nq,) a start position instead.
+        qpos: (nq,) a start position, in place of a keyframe.
         seed: for random excitations.
         progress: called after every step.
 

@@ -1,4 +1,4 @@
-"""The comparison of both programs over all poses: which motions are compared, and the collected results."""
+"""Compare both programs over all poses: choose the motions, and collect the results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.comparison.jumps import Jump, find_jumps
 from mjwrap.comparison.motion import pristine
-from mjwrap.comparison.twins import Batch, Comparer
+from mjwrap.comparison.paired_evaluation import Batch, Comparer
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.errors import ModelError
 from mjwrap.poses.joint_sweeps import PoseMaker
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class PoseComparison:
-    """What all poses of a comparison showed.
+    """The results of a comparison over all poses.
 
     Attributes:
         muscles: a summary for each muscle, by name.
@@ -60,7 +60,7 @@ def compare_poses(
     """Compare both programs along sweeps of every joint around the base pose, and at random poses.
 
     Args:
-        model: taken as it is, not changed.
+        model: the model; it is not changed.
         names: of muscles; None for all.
         samples: number of poses of a sweep, and of random poses.
         bases: number of further poses around which joints are swept: the middle of all ranges first, then random ones.
@@ -96,11 +96,11 @@ def compare_poses(
 
     def take(batch: Batch) -> None:
         found.poses += len(batch.motion.at)
-        for twin in batch.twins:
+        for pair in batch.pairs:
             summary = found.muscles.setdefault(
-                twin.name, MuscleSummary(twin.name, muscles.native.get(twin.name, ""))
+                pair.name, MuscleSummary(pair.name, muscles.native.get(pair.name, ""))
             )
-            summary.add(model, batch.motion, twin)
+            summary.add(model, batch.motion, pair)
         if each is not None:
             each(batch)
 

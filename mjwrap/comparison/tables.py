@@ -1,4 +1,4 @@
-"""Lengths and moment arms from another program, beside MuJoCo's and mjwrap's at the same poses.
+"""Compare lengths and moment arms from another program with those of MuJoCo and mjwrap at the same poses.
 
 OpenSim's MuscleAnalysis writes such tables: lengths of all muscles over time, and moment arms about one coordinate in
 each file. Models of the same person in two programs seldom have the same zero of length, so the difference is
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.comparison.motion import pristine
-from mjwrap.comparison.twins import Comparer
+from mjwrap.comparison.paired_evaluation import Comparer
 from mjwrap.errors import TableError
 from mjwrap.files import Table
 from mjwrap.system import MuscleSystem
@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TableDifference:
-    """How far one program is from a table, for one muscle: program minus table, over all rows where it has a path.
+    """The difference of one program from a table for one muscle: program minus table, over all rows with a path.
 
     Attributes:
-        muscle: its name.
+        muscle: name of the muscle.
         program: "MuJoCo" or "mjwrap".
         quantity: "length" [m] or "moment arm" [m].
         about: the joint of the moment arm, or "".
@@ -38,9 +38,9 @@ class TableDifference:
         rms: root mean square of the difference [m].
         spread: root mean square about the mean [m].
         largest: largest difference [m].
-        time: its time [s].
-        value: the program's value there [m].
-        table: the table's value there [m].
+        time: time of the largest difference [s].
+        value: the program's value at this time [m].
+        table: the table's value at this time [m].
     """
 
     muscle: str
@@ -57,8 +57,8 @@ class TableDifference:
     table: float
 
 
-class Beside(NamedTuple):
-    """A column of a table, and what both programs have there, (T,) each: nan where one has no path.
+class TableColumn(NamedTuple):
+    """A column of a table, and the values of both programs, (T,) each: nan where a program has no path.
 
     about: the joint of the moment arms [m], or "" for lengths [m].
     """
@@ -78,13 +78,13 @@ def compare_tables(
     lengths: Table | None = None,
     moment_arms: Mapping[str, Table] | None = None,
     *,
-    each: Callable[[Beside], object] | None = None,
+    each: Callable[[TableColumn], object] | None = None,
 ) -> list[TableDifference]:
     """Compare MuJoCo's tendons and mjwrap's paths with tables of another program, muscle by muscle.
 
     A column belongs to the muscle of its name; a path before the name and the prefixes of `mjwrap run --columns` are
     ignored. Values of a table are compared at its own times, at poses that are interpolated linearly in the motion. A
-    tendon that only holds a place for another route is not compared.
+    tendon that is only a placeholder for another route is not compared.
 
     Args:
         model: the model.
@@ -112,7 +112,7 @@ def compare_tables(
 
 def _compare(
     model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str,
-    each: Callable[[Beside], object] | None,
+    each: Callable[[TableColumn], object] | None,
 ) -> list[TableDifference]:  # fmt: skip
     dof = _dof(model, joint) if joint else -1
     muscles = MuscleSystem(model)
@@ -146,7 +146,7 @@ def _compare(
     for name in known:
         if name in columns and each is not None:
             both = [values.get((program, name), absent) for program in ("MuJoCo", "mjwrap")]
-            each(Beside(name, joint, table.time, columns[name], *both))
+            each(TableColumn(name, joint, table.time, columns[name], *both))
     told = [
         _difference(name, program, joint, table.time, value, columns[name])
         for (program, name), value in values.items()

@@ -1,4 +1,4 @@
-"""MuJoCo's tendons at a pose: their routes, and the points of their paths."""
+"""Read the routes of MuJoCo's tendons, and the points of their paths."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from mjwrap.mjcf import MuscleDeclaration, tendon_stops
 
 Array = NDArray[np.float64]
-_PULLEY_MARK = -2  # in wrap_obj; sites are -1, geoms their id
+_PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
 
 
 class Span(NamedTuple):
-    """A part of a tendon from one site to the next: over a geom (-1: none), counted with a weight (pulleys).
+    """A part of a tendon from one site to the next, over a geom (-1: none); weight: its factor in the length (pulleys).
 
-    inside: it is held to the geom's solid.
+    inside: whether it must meet the geom's solid.
     """
 
     start: int
@@ -48,7 +48,7 @@ def tendon_spans(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> li
 
 
 def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
-    """Return the spans of a declared muscle, or None where it has several geoms between two sites."""
+    """Return the spans of a declared muscle, or None if it has several geoms between two sites."""
     spans: list[Span] = []
     for route in muscle.routes:
         last, geom, hint, inside = route.origin, -1, -1, False
@@ -66,7 +66,7 @@ def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
 
 @dataclass
 class SpanPoints:
-    """Where one span's path ran, pose by pose: a to b (T, 3), over p and q (T, 3) where touched (T,). World [m]."""
+    """The points of one span at each pose: a to b (T, 3), over p and q (T, 3) where touched (T,). World [m]."""
 
     a: Array
     b: Array
@@ -76,13 +76,13 @@ class SpanPoints:
 
     @classmethod
     def empty(cls, count: int) -> SpanPoints:
-        """Return room for `count` poses."""
+        """Return empty points for `count` poses."""
         a, b, p, q = (np.zeros((count, 3)) for _ in range(4))
         return cls(a, b, np.zeros(count, dtype=np.bool_), p, q)
 
 
 class WrapRecord:
-    """The points of all tendons over a motion, as MuJoCo left them in wrap_obj and wrap_xpos."""
+    """The points of all tendons over a motion, from MuJoCo's wrap_obj and wrap_xpos."""
 
     def __init__(self, model: mujoco.MjModel, count: int) -> None:
         self.model = model
@@ -92,12 +92,12 @@ class WrapRecord:
         self.pos = np.zeros((count, 2 * model.nwrap, 3))
 
     def keep(self, k: int, data: mujoco.MjData) -> None:
-        """Keep the points of pose k."""
+        """Store the points of pose k."""
         self.adr[k], self.num[k] = data.ten_wrapadr, data.ten_wrapnum
         self.obj[k], self.pos[k] = data.wrap_obj.reshape(-1), data.wrap_xpos.reshape(-1, 3)
 
     def points(self, tendon: int, spans: list[Span]) -> list[SpanPoints]:
-        """Return the points of a tendon's spans at all kept poses."""
+        """Return the points of a tendon's spans at all stored poses."""
         found = [SpanPoints.empty(len(self.obj)) for _ in spans]
         width = int(self.num[:, tendon].max(initial=0))
         index = self.adr[:, tendon, None] + np.arange(width)
@@ -116,7 +116,7 @@ class WrapRecord:
 
 
 def _places(spans: list[Span], pattern: NDArray[np.int64]) -> list[tuple[int, int, int, int]]:
-    """Return for every span the columns of a, p, q, b in a row of wrap_obj; p = q = a where nothing is touched."""
+    """Return for every span the columns of a, p, q, b in a row of wrap_obj; p = q = a if no geom is touched."""
     places: list[tuple[int, int, int, int]] = []
     column = 0
     for span in spans:

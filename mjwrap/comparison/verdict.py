@@ -1,4 +1,4 @@
-"""Verdicts on the paths of both programs, pose by pose, collected for each muscle."""
+"""The outcome of the comparison at each pose, and a summary for each muscle."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.comparison.judge_geodesic import Fault
-from mjwrap.comparison.twins import PathRecord, Twin
+from mjwrap.comparison.paired_evaluation import MusclePair, PathRecord
 from mjwrap.mjcf import name_of
 from mjwrap.paths import Status
 from mjwrap.poses.joint_sweeps import PoseSequence
 
 Array = NDArray[np.float64]
-AGREE = 1e-9  # [m, m/s, m/rad] two true geodesics on one branch agree to this
-HELD = 1e-6  # [m, m/s, m/rad] the same where a string is held inside: MuJoCo finds its corner to 1e-6 rad
+AGREE = 1e-9  # [m, m/s, m/rad] largest difference of two true geodesics on the same branch
+INSIDE_TOLERANCE = 1e-6  # the same if a string is held inside: MuJoCo finds its corner to 1e-6 rad
 
 
 class Outcome(enum.IntEnum):
-    """What comparing one muscle at one pose showed."""
+    """The outcome of the comparison of one muscle at one pose."""
 
     AGREE = 0  # both are the same true geodesic
-    OTHER_BRANCH = 1  # both are true geodesics, round the cylinder another way
+    OTHER_BRANCH = 1  # both are true geodesics, but go round the cylinder in different ways
     MUJOCO_NOT_GEODESIC = 2  # mjwrap's path is a true geodesic, MuJoCo's is not
-    NO_PATH = 3  # mjwrap found none, and MuJoCo's is not a geodesic either
-    MJWRAP_FAILED = 4  # mjwrap found none where MuJoCo's path is a true geodesic
+    NO_PATH = 3  # mjwrap found no path, and MuJoCo's is not a geodesic either
+    MJWRAP_FAILED = 4  # mjwrap found no path, but MuJoCo's is a true geodesic
     MJWRAP_WRONG = 5  # mjwrap's path is not a true geodesic
-    UNEXPLAINED = 6  # both are judged the same true geodesic, and their numbers differ
+    UNEXPLAINED = 6  # both are judged to be the same true geodesic, but their numbers differ
     WRONG_SIDE = (
         7  # from a cold start mjwrap passes a cylinder on the side away from its hint, MuJoCo does not
     )
@@ -39,23 +39,23 @@ class Outcome(enum.IntEnum):
 MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED, Outcome.WRONG_SIDE)
 
 
-def outcomes(twin: Twin, continuous: bool) -> NDArray[np.int64]:
-    """Return the `Outcome` (T,) of a muscle that both programs have; continuous: whether mjwrap keeps its branch."""
-    native, mine = twin.native, twin.mjwrap
+def outcomes(pair: MusclePair, continuous: bool) -> NDArray[np.int64]:
+    """Return the `Outcome` (T,) of a muscle in both programs; continuous: whether mjwrap keeps its branch."""
+    native, mine = pair.native, pair.mjwrap
     assert mine is not None
     count = len(native.length)
     same = (np.abs(native.turns - mine.turns) < 1e-3).all(axis=1)
-    held = (native.touched & [span.inside for span in twin.spans]).any(axis=1)
-    near = differences(native, mine).max(axis=0) <= np.where(held, HELD, AGREE)
+    held = (native.touched & [span.inside for span in pair.spans]).any(axis=1)
+    near = differences(native, mine).max(axis=0) <= np.where(held, INSIDE_TOLERANCE, AGREE)
     found = np.full(count, Outcome.UNEXPLAINED, dtype=np.int64)
-    for here, outcome in (  # the last that holds counts
+    for here, outcome in (  # the last outcome that applies is used
         (near & same, Outcome.AGREE),
         (~same, Outcome.OTHER_BRANCH),
         (~same & (not continuous) & (native.hinted & ~mine.hinted).any(axis=1), Outcome.WRONG_SIDE),
         (native.fault != 0, Outcome.MUJOCO_NOT_GEODESIC),
         (mine.fault != 0, Outcome.MJWRAP_WRONG),
-        ((twin.status != 0) & (native.fault == 0), Outcome.MJWRAP_FAILED),
-        ((twin.status != 0) & (native.fault != 0), Outcome.NO_PATH),
+        ((pair.status != 0) & (native.fault == 0), Outcome.MJWRAP_FAILED),
+        ((pair.status != 0) & (native.fault != 0), Outcome.NO_PATH),
     ):
         found[here] = outcome
     return found
@@ -69,7 +69,7 @@ def differences(native: PathRecord, mine: PathRecord) -> Array:
 
 @dataclass
 class Extreme:
-    """The largest difference of one quantity, and where: motion, place in it, joint values, both programs' numbers."""
+    """The largest difference of one quantity: its motion, place, joint positions, and both programs' numbers."""
 
     difference: float = 0.0
     motion: str = ""
@@ -82,7 +82,7 @@ class Extreme:
 
 @dataclass
 class Curves:
-    """One sweep of one muscle, for a plot: at, and length and slope of both programs (T,)."""
+    """One sweep of one muscle for a plot: at, and length and slope of both programs, (T,) each."""
 
     motion: str
     at: Array
@@ -96,11 +96,13 @@ class Curves:
 
 @dataclass
 class MuscleSummary:
-    """What all poses showed of one muscle.
+    """The results of all poses for one muscle.
 
-    native_only: why it stays native, or empty; counts: poses by `Outcome` name; faults: MuJoCo's faults by (fault,
-    geom), with the largest measure; statuses: mjwrap's failures by message; agreement (3,): the largest differences at
-    poses where both are the same true geodesic; length, velocity, moment_arm: the largest differences of all.
+    native_only: why it stays with MuJoCo, or empty; counts: poses by `Outcome` name; faults: MuJoCo's faults by (fault,
+    geom); measures: their largest measures; own_faults, statuses: mjwrap's faults and failures by message; agreement
+    (3,): the largest differences at poses where both are the same true geodesic; length, velocity, moment_arm: the
+    largest differences of all poses; longer_branch [m]: mjwrap minus MuJoCo where they are on different branches, of
+    the largest size.
     """
 
     name: str
@@ -121,21 +123,21 @@ class MuscleSummary:
     curves: Curves | None = None
     bad_poses: list[tuple[str, str, float, dict[str, float]]] = field(default_factory=list)
 
-    def add(self, model: mujoco.MjModel, motion: PoseSequence, twin: Twin) -> None:
-        """Take in one motion."""
-        native, mine = twin.native, twin.mjwrap
+    def add(self, model: mujoco.MjModel, motion: PoseSequence, pair: MusclePair) -> None:
+        """Add the results of one motion."""
+        native, mine = pair.native, pair.mjwrap
         self.poses += len(motion.at)
         for k in np.flatnonzero(native.fault):
-            geom = _geom(model, twin, int(native.span[k]))
+            geom = _geom(model, pair, int(native.span[k]))
             key = Fault(int(native.fault[k])), geom
             self.faults[key] += 1
             self.measures[key] = max(self.measures.get(key, 0.0), float(native.measure[k]))
         if mine is None:
-            self._keep_curves(motion, twin, 0.0)
+            self._keep_curves(motion, pair, 0.0)
             return
-        found = outcomes(twin, motion.continuous)
+        found = outcomes(pair, motion.continuous)
         self.counts.update(Outcome(int(o)).name for o in found)
-        self.statuses.update(Status(int(s)).message for s in twin.status[twin.status != 0])
+        self.statuses.update(Status(int(s)).message for s in pair.status[pair.status != 0])
         wrong = found == Outcome.MJWRAP_WRONG
         self.own_faults.update(
             Fault(int(f)).words.format(m) for f, m in zip(mine.fault[wrong], mine.measure[wrong], strict=True)
@@ -157,12 +159,14 @@ class MuscleSummary:
             longer = (mine.length - native.length)[other]
             most = float(longer[np.argmax(np.abs(longer))])
             self.longer_branch = most if abs(most) > abs(self.longer_branch) else self.longer_branch
-        gaps = np.where(twin.status == 0, gaps, 0.0)
-        self._keep_extremes(model, motion, twin, gaps)
-        self._keep_curves(motion, twin, float(gaps[0].max(initial=0.0)))
+        gaps = np.where(pair.status == 0, gaps, 0.0)
+        self._keep_extremes(model, motion, pair, gaps)
+        self._keep_curves(motion, pair, float(gaps[0].max(initial=0.0)))
 
-    def _keep_extremes(self, model: mujoco.MjModel, motion: PoseSequence, twin: Twin, gaps: Array) -> None:
-        native, mine = twin.native, twin.mjwrap
+    def _keep_extremes(
+        self, model: mujoco.MjModel, motion: PoseSequence, pair: MusclePair, gaps: Array
+    ) -> None:
+        native, mine = pair.native, pair.mjwrap
         assert mine is not None
         for row, name in enumerate(("length", "velocity", "moment_arm")):
             k = int(np.argmax(gaps[row]))
@@ -178,19 +182,19 @@ class MuscleSummary:
             where = motion.name, float(motion.at[k]), _joints(model, motion.qpos[k])
             setattr(self, name, Extreme(float(gaps[row, k]), *where, float(theirs), float(ours), dof))
 
-    def _keep_curves(self, motion: PoseSequence, twin: Twin, gap: float) -> None:
-        """Keep the sweep that shows most: the largest difference, else the largest change of length."""
+    def _keep_curves(self, motion: PoseSequence, pair: MusclePair, gap: float) -> None:
+        """Keep the sweep with the largest difference or, without differences, the largest change of length."""
         if not motion.continuous:
             return
-        change = float(np.ptp(twin.native.length))
+        change = float(np.ptp(pair.native.length))
         score = (gap if gap > AGREE else 0.0, change)
         if self.curves is not None and score <= self._score:
             return
         self._score = score
-        mine = twin.mjwrap
+        mine = pair.mjwrap
         self.curves = Curves(
-            motion.name, motion.at, twin.native.length, slope(twin.native, motion),
-            None if mine is None else mine.length, None if mine is None else slope(mine, motion), twin.status != 0,
+            motion.name, motion.at, pair.native.length, slope(pair.native, motion),
+            None if mine is None else mine.length, None if mine is None else slope(mine, motion), pair.status != 0,
             motion.base,
         )  # fmt: skip
 
@@ -198,7 +202,7 @@ class MuscleSummary:
 
     @property
     def at_fault(self) -> int:
-        """Number of poses at which mjwrap, not MuJoCo, is wrong or without an answer."""
+        """Number of poses at which mjwrap is wrong, or has no path although MuJoCo's is a true geodesic."""
         return sum(self.counts[outcome.name] for outcome in MJWRAP_AT_FAULT)
 
 
@@ -207,10 +211,10 @@ def slope(record: PathRecord, motion: PoseSequence) -> Array:
     return np.einsum("tj,tj->t", record.jacobian, motion.tangent)
 
 
-def _geom(model: mujoco.MjModel, twin: Twin, span: int) -> str:
+def _geom(model: mujoco.MjModel, pair: MusclePair, span: int) -> str:
     if span < 0:
         return ""
-    return name_of(model, mujoco.mjtObj.mjOBJ_GEOM, twin.spans[span].geom)
+    return name_of(model, mujoco.mjtObj.mjOBJ_GEOM, pair.spans[span].geom)
 
 
 def _joints(model: mujoco.MjModel, qpos: Array) -> dict[str, float]:

@@ -16,7 +16,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name when it is first used: `files.atomic`, beside which these stand, needs no NumPy."""
+    """Load a name when it is first used, so that importing `files.atomic` does not import NumPy."""
     if name not in _HOMES:
         raise AttributeError(f"module 'mjwrap.files' has no attribute {name!r}; it has: {', '.join(__all__)}")
     value = getattr(importlib.import_module(f"mjwrap.files.{_HOMES[name]}"), name)

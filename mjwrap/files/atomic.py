@@ -1,4 +1,4 @@
-"""Files that are either complete under their name or absent, and what their writers share."""
+"""Files that are either complete under their name or absent, and the base class of their writers."""
 
 import contextlib
 import os
@@ -18,19 +18,19 @@ from mjwrap.errors import RecordingError
 if TYPE_CHECKING:
     import numpy as np
 
-# signals that ask a process to end: Ctrl-C, kill, and the terminal that is closed (which Windows does not have)
+# signals that ask a process to end: Ctrl-C, kill, and a closed terminal (not on Windows)
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class PartFile:
-    """A temporary file beside `path`, created empty at once, so that an unwritable place shows before a run.
+    """A temporary file beside `path`, created at once, so that a place that cannot be written is noticed before a run.
 
-    `part` is written to; `publish` gives it the name `path` in one step, which replaces an older file of that name;
-    `discard` removes it. Until then an existing `path` stays as it is. `option` is what the place was given by,
+    `part` is the file to write; `publish` gives it the name `path` in one step, replacing an older file of that name;
+    `discard` removes it. Until then an existing `path` is unchanged. option: the name of the option that gave the path,
     for messages.
 
-    Raises RecordingError where `path` ends in none of the suffixes, names something other than a regular file, may
-    not be overwritten, or lies in a folder that is missing or cannot be written.
+    Raises RecordingError if `path` has none of the suffixes, is not a regular file, may not be overwritten, or lies in
+    a folder that does not exist or cannot be written.
     """
 
     def __init__(self, path: str | os.PathLike[str], *suffixes: str, option: str = "") -> None:
@@ -41,8 +41,8 @@ class PartFile:
             first = suffixes[0]
             example = self.path.with_suffix(first) if self.path.name else self.path / f"run{first}"
             raise RecordingError(
-                f"cannot write {self._named}: the name must end in {' or '.join(suffixes)}, by which programs "
-                f"know what it is; for example '{example}'"
+                f"cannot write {self._named}: the name must end in {' or '.join(suffixes)}, which tells programs "
+                f"its format; for example '{example}'"
             )
         unique = f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
         self.part = self.path.with_name(f".{self.path.stem}.{unique}.part{self.path.suffix}")
@@ -56,7 +56,7 @@ class PartFile:
             raise RecordingError(f"cannot write {self._named}: {fault}")
 
     def _overwrite_fault(self) -> str:
-        """Say why `path`, where it exists, may not be replaced."""
+        """Return why an existing `path` may not be replaced, or an empty string."""
         try:
             mode = self.path.stat().st_mode
         except FileNotFoundError:
@@ -68,7 +68,7 @@ class PartFile:
         return "" if os.access(self.path, os.W_OK) else "it exists and is write-protected"
 
     def open_text(self) -> IO[str]:
-        """Return the part, open for text; it is closed with the rest."""
+        """Return the temporary file, open for text; `publish` and `discard` close it."""
         self._text = self.part.open("w", encoding="utf-8", newline="")
         return self._text
 
@@ -80,7 +80,7 @@ class PartFile:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Turn what the disk refuses inside a with block into a RecordingError."""
+        """Convert an OSError inside a with block to a RecordingError."""
         try:
             yield
         except RecordingError:
@@ -89,7 +89,7 @@ class PartFile:
             raise self.failure(error) from error
 
     def publish(self) -> None:
-        """Put the finished file on the disk and give it its name."""
+        """Write the finished file to the disk and give it its name."""
         with self.writing():
             if self._text is not None:
                 self._text.close()
@@ -106,16 +106,16 @@ class PartFile:
             self.part.unlink(missing_ok=True)
 
     def failure(self, error: Exception) -> RecordingError:
-        """The error to raise where `error` ended the writing."""
+        """Return the error to raise if `error` ended the writing."""
         reason = _reason(error, self.path) if isinstance(error, OSError) else str(error)
-        return RecordingError(f"writing {self._named} failed: {reason}; nothing was kept of it")
+        return RecordingError(f"writing {self._named} failed: {reason}; the incomplete file was removed")
 
 
 class RunLog:
-    """What a run is logged to: complete once it is closed, and nothing where the run ends with an error.
+    """A log of a run: its file is complete once it is closed, and removed if the run ends with an error.
 
-    A subclass calls `_begin` at the end of its `__init__`, acts on the file inside `_guarded` only, and completes
-    what it writes in `_finish`. `_ended` says why no more can be logged.
+    A subclass calls `_begin` at the end of its `__init__`, writes to the file only inside `_guarded`, and completes it
+    in `_finish`. `_ended` is the reason why nothing more can be logged.
     """
 
     _ended = ""
@@ -123,7 +123,7 @@ class RunLog:
     _target: PartFile | None
 
     def _begin(self, place: str, target: PartFile | None, release: Callable[[], object]) -> None:
-        """Start the life of the log; release: lets go of what it holds, complete or not, and knows nothing of it."""
+        """Begin the log; release: a function, without a reference to the log, that frees its resources."""
         self._place, self._target, self._release = place, target, release
         self._finalizer = weakref.finalize(self, _forgotten, type(self).__name__, place, target, release)
 
@@ -133,13 +133,13 @@ class RunLog:
         raise NotImplementedError
 
     def _finish(self) -> None:
-        """Complete the file; it has its name afterwards."""
+        """Complete the file and give it its name."""
         raise NotImplementedError
 
     def close(self) -> None:
-        """Write what is left, check that it is complete and give the file its name; a second call does nothing.
+        """Write the rest, check that the file is complete, and give it its name; a second call does nothing.
 
-        Raises RecordingError, and leaves nothing behind, where the disk is full.
+        Raises RecordingError, and leaves no file, if the disk is full.
         """
         if not self._ended:
             self._guarded(self._publish)
@@ -151,11 +151,11 @@ class RunLog:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is not None and issubclass(kind, Exception):
-            self._discard("the run ended with an error and nothing was kept")
+            self._discard("the run ended with an error, so no file was written")
         elif kind is not None and self._empty:
             self._discard("the run was stopped before anything was logged")
         else:
-            self.close()  # KeyboardInterrupt and SystemExit too: what was logged so far is kept
+            self.close()  # after KeyboardInterrupt and SystemExit, too, the log so far is kept
 
     def _publish(self) -> None:
         self._finish()
@@ -165,7 +165,7 @@ class RunLog:
         self._finalizer.detach()
 
     def _guarded(self, action: Callable[[], None]) -> None:
-        """Act whole or not at all: Ctrl-C waits for the end, an error removes the file."""
+        """Run an action without interruption by Ctrl-C; an error removes the file."""
         with uninterrupted():
             try:
                 with self._target.writing() if self._target else contextlib.nullcontext():
@@ -182,7 +182,7 @@ class RunLog:
 
 
 def _let_go(target: PartFile | None, release: Callable[[], object]) -> None:
-    with contextlib.suppress(Exception):  # nothing is kept, whatever the rest of it says
+    with contextlib.suppress(Exception):  # the file is removed, so further errors do not matter
         release()
     if target:
         target.discard()
@@ -191,7 +191,7 @@ def _let_go(target: PartFile | None, release: Callable[[], object]) -> None:
 def _forgotten(kind: str, place: str, target: PartFile | None, release: Callable[[], object]) -> None:
     _let_go(target, release)
     warnings.warn(
-        f"the {kind} of '{place}' was never closed, so nothing was kept; use it in a with statement",
+        f"the {kind} of '{place}' was never closed, so no file was written; use it in a with statement",
         RuntimeWarning,
         stacklevel=2,
     )
@@ -199,7 +199,7 @@ def _forgotten(kind: str, place: str, target: PartFile | None, release: Callable
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C, and what else a handler in Python is there for, back until the block is done."""
+    """Delay Ctrl-C, and other signals with a handler in Python, until the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -218,13 +218,13 @@ def uninterrupted() -> Iterator[None]:
 
 
 def require(name: str, value: object, holds: "bool | np.bool_", wanted: str) -> None:
-    """Raise RecordingError unless an argument holds."""
+    """Raise RecordingError unless an argument is valid."""
     if not holds:
         raise RecordingError(f"{name} must be {wanted}, not {value!r}")
 
 
 def _reason(error: OSError, path: Path) -> str:
-    """Name the cause of an OSError, and the folder that exists where one is missing."""
+    """Return the cause of an OSError as text; if a folder is missing, name the part of the path that exists."""
     folder = path.absolute().parent
     if isinstance(error, FileNotFoundError) and not folder.exists():
         existing = next(parent for parent in folder.parents if parent.exists())

@@ -1,4 +1,4 @@
-"""Reading tables over time, with errors that say where in the file a problem is."""
+"""Read tables over time, with errors that name the place in the file."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Row = tuple[int, list[str]]  # line number, cells
 
 
 def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
-    """Read a table over time: .sto or .mot of OpenSim, .npz, else comma-separated values.
+    """Read a table over time: OpenSim's .sto or .mot, .npz, else comma-separated values.
 
-    finite: refuse what is not finite. A CSV file has a header with `time` [s] and names; an NPZ file has `time` (T,),
-    and either `columns` and `values`, as `write_table` leaves it, or an array (T,) for each column, or (T, k) for
-    columns called name[0] to name[k − 1]. Numbers are those of the file: `Table.in_degrees` says whether rotations
-    are in degrees. `TableError` names file, line and column of the first thing that is wrong.
+    finite: refuse numbers that are not finite. A CSV file has a header with `time` [s] and names; an NPZ file has
+    `time` (T,), and either `columns` and `values`, as from `write_table`, or an array (T,) for each column, or (T, k)
+    for columns called name[0] to name[k − 1]. Numbers are returned as in the file: `Table.in_degrees` tells whether
+    rotations are in degrees. Raises `TableError`, which names file, line and column of the first error.
     """
     name = os.fspath(path)
     suffix = Path(name).suffix.lower()
@@ -62,11 +62,11 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
     lines = text.splitlines()
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None:
-        raise TableError(f"'{name}' has no line 'endheader', which ends the header of OpenSim's files")
+        raise TableError(f"'{name}' has no line 'endheader', which must end the header of OpenSim's files")
     metadata = _header(lines[:end])
     kind = metadata.get("DataType", "double")
     if kind.lower() != "double":
-        raise TableError(f"'{name}' holds {kind} in its cells; only DataType=double can be read")
+        raise TableError(f"'{name}' has {kind} in its cells; only DataType=double can be read")
     rest = [(i, line) for i, line in enumerate(lines[end + 1 :], end + 2) if line.strip()]
     if not rest:
         raise TableError(f"'{name}' has no line of names after 'endheader'")
@@ -83,7 +83,7 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
 
 
 def _header(lines: list[str]) -> dict[str, str]:
-    """Return what a header says: "key=value", SIMM's "key value", and the first line as the name."""
+    """Return the entries of a header: "key=value", SIMM's "key value", and the first line as the name."""
     found: dict[str, str] = {}
     for line in lines:
         key, equals, value = (part.strip() for part in line.partition("="))

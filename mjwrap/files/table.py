@@ -1,4 +1,4 @@
-"""One table over time, whatever file it comes from or goes to."""
+"""A table over time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Table:
         source: the file from which the table was read.
 
     Raises:
-        TableError: these do not fit together.
+        TableError: shapes differ, times do not increase, or names are not unique.
     """
 
     time: Array
@@ -66,8 +66,8 @@ class Table:
 
 
 def check_names(names: Sequence[str], where: str = "") -> None:
-    """Raise `TableError` for columns without a name of their own."""
+    """Raise `TableError` if names of columns are empty or repeated."""
     double = sorted({name for name in names if names.count(name) > 1})
     if double or "" in names:
-        which = ", ".join(name for name in double if name) or "the blank ones"
-        raise TableError(f"{where}every column needs a name of its own; look at {which}")
+        which = ", ".join(name for name in double if name) or "the empty names"
+        raise TableError(f"{where}every column must have a name that no other has; check {which}")

@@ -1,4 +1,4 @@
-"""Writing tables over time, complete or row by row during a run."""
+"""Write tables over time, complete or row by row during a run."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from mjwrap.errors import RecordingError, TableError
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.table import SUFFIXES, Array, Table, check_names
 
-_DIGITS = 12  # room for the number of rows, which is known at the end
+_DIGITS = 12  # space for the number of rows, which is known at the end
 
 
 def write_table(path: str | os.PathLike[str], table: Table) -> None:
-    """Write a table as its suffix says: .sto or .mot of OpenSim (version 3), .csv, .npz; whole or not at all.
+    """Write a table as OpenSim's .sto or .mot (version 3), .csv or .npz, by the suffix; complete or not at all.
 
-    Numbers are written in full precision. CSV has no place for metadata. `TableError` where that place cannot be
-    written, or a name cannot stand in such a file.
+    Numbers are written in full precision. CSV has no metadata. Raises `TableError` if the file cannot be written, or if
+    a name is not possible in such a file.
     """
     output: PartFile | None = None
     try:
@@ -51,7 +51,7 @@ def save_npz(path: Path, table: Table) -> None:
 
 
 class RowWriter:
-    """Writes the rows of a .sto, .mot or .csv file as they come, into a text file that can be rewound."""
+    """Write the rows of a .sto, .mot or .csv file one by one, to a text file that can be rewound."""
 
     def __init__(
         self, file: IO[str], suffix: str, names: Sequence[str], metadata: Mapping[str, str] | None = None
@@ -65,7 +65,9 @@ class RowWriter:
         self._between = "\t"
         for name in names:
             if any(c in name for c in "\t\r\n"):
-                raise TableError(f"column {name!r}: a name in OpenSim's files has no tabs and no line ends")
+                raise TableError(
+                    f"column {name!r}: in OpenSim's files a name must not contain tabs or line ends"
+                )
         given = dict(metadata or {})
         file.write(_line(given.pop("header", "mjwrap")) + "\n")
         for key in ("nRows", "nColumns", "datarows", "datacolumns", "range", "version", "DataType"):
@@ -77,13 +79,13 @@ class RowWriter:
         file.write("endheader\n" + "\t".join(("time", *names)) + "\n")
 
     def add(self, time: float, row: Iterable[float] | Array) -> None:
-        """Write a row: time [s] and a number for each name, as many digits as it takes to read the same number back."""
+        """Write a row: time [s] and a number for each name, with enough digits to read back the same number."""
         numbers = row.tolist() if isinstance(row, np.ndarray) else row
         self._file.write(self._between.join(map(repr, (float(time), *numbers))) + "\n")
         self._rows += 1
 
     def finish(self) -> None:
-        """Put the number of rows into the header."""
+        """Write the number of rows into the header."""
         if self._place >= 0:
             end = self._file.tell()
             self._file.seek(self._place)

@@ -1,4 +1,4 @@
-"""Fits of every shape, and their results: a surface with its pose, its distances from the points, its MJCF elements."""
+"""Fit surfaces of every shape; a result has the surface, its pose, the points' distances, and MJCF elements."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from mjwrap.errors import GeometryError
 from mjwrap.fitting import shapes
 from mjwrap.fitting.least_squares import LOST, growth, solve
 from mjwrap.fitting.shapes import Array, Shape
-from mjwrap.fitting.symmetry import settled
+from mjwrap.fitting.symmetry import canonical_frame
 from mjwrap.paths import Obstacle
 from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
 
 _GEOMS = {Sphere: "sphere", Cylinder: "cylinder", Ellipsoid: "ellipsoid", Capsule: "capsule"}
-MARK = 0.001  # radius of the sphere geom that carries a shape which MuJoCo has no geom for [m]
+MARK = 0.001  # [m] radius of the sphere geom that carries a shape for which MuJoCo has no geom
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +28,11 @@ class Fit:
     """A surface fitted to points, in the points' frame.
 
     Attributes:
-        surface: the surface. Cylinders and cones are as long as the points reach.
+        surface: the surface. Cylinders and cones are as long as the range of the points.
         pos: (3,) origin of its frame [m].
         quat: (4,) orientation of its frame, w, x, y, z.
-        distances: (m,) distances of the points from it [m], positive where they stick out. Cylinders and cones count
-            as endless here.
+        distances: (m,) distances of the points from it [m], positive outside. Cylinders and cones count as infinite
+            here.
         growth: factor by which a small error of the points can grow on parts of the surface without points; about 1 if
             the points cover all of it.
     """
@@ -67,13 +67,13 @@ class Fit:
         )
 
     def numeric_xml(self, name: str) -> str:
-        """Return the <numeric> for <custom> that gives the geom of this name its shape, "" where it has it."""
+        """Return the <numeric> that gives the geom its shape, for <custom>; "" if the geom itself has the shape."""
         if type(self.surface) in _GEOMS:
             return ""
         return f'<numeric name="{self._numeric(name)}" data="{_text(_values(self.surface))}"/>'
 
     def elements_xml(self, name: str) -> str:
-        """Return the elements of a muscle's <tuple> that lead it over the surface."""
+        """Return the elements for a muscle's <tuple> that make it wrap over the surface."""
         if type(self.surface) in _GEOMS:
             end = ' prm="1"' * isinstance(self.surface, Cylinder)
             return f'<element objtype="geom" objname="{name}"{end}/>'
@@ -90,33 +90,33 @@ def fit_sphere(points: ArrayLike, *, scale: float | None = None) -> Fit:
 
 
 def fit_cylinder(points: ArrayLike, *, scale: float | None = None) -> Fit:
-    """Fit a circular cylinder, as long as the points reach; see `fit_ellipsoid`."""
+    """Fit a circular cylinder, as long as the range of the points; see `fit_ellipsoid`."""
     return _fit(shapes.CYLINDER, points, scale)
 
 
 def fit_ellipsoid(points: ArrayLike, *, scale: float | None = None) -> Fit:
     """Fit an ellipsoid to points (m, 3) [m], by least squares on their distances from it.
 
-    scale [m]: points farther from the surface than about this count less and less (Cauchy's loss), which keeps spurs
-    and grooves of a bone from bending it; None: all points count alike. Raises `GeometryError` for points that are not
-    finite, too few (nine numbers determine an ellipsoid), in a plane or on a line, or on so small a part of the surface
-    that they say nothing of the rest.
+    scale [m]: points farther from the surface than this distance get less weight (Cauchy's loss), so that spurs and
+    grooves of a bone do not distort it; None: all points have the same weight. Raises `GeometryError` for points that
+    are not finite, too few (an ellipsoid needs nine), in a plane or on a line, or on so small a part of the surface
+    that they do not determine the rest.
     """
     return _fit(shapes.ELLIPSOID, points, scale)
 
 
 def fit_elliptic_cylinder(points: ArrayLike, *, scale: float | None = None) -> Fit:
-    """Fit a cylinder with an elliptic section, as long as the points reach; see `fit_ellipsoid`."""
+    """Fit a cylinder with an elliptic section, as long as the range of the points; see `fit_ellipsoid`."""
     return _fit(shapes.ELLIPTIC_CYLINDER, points, scale)
 
 
 def fit_torus(points: ArrayLike, *, scale: float | None = None) -> Fit:
-    """Fit a torus, all round or to a saddle-shaped part such as a notch; see `fit_ellipsoid`."""
+    """Fit a torus, to the whole ring or to a saddle-shaped part such as a notch; see `fit_ellipsoid`."""
     return _fit(shapes.TORUS, points, scale)
 
 
 def fit_cone(points: ArrayLike, *, scale: float | None = None) -> Fit:
-    """Fit a cone or tapered cylinder, as long as the points reach; see `fit_ellipsoid`."""
+    """Fit a cone or tapered cylinder, as long as the range of the points; see `fit_ellipsoid`."""
     return _fit(shapes.CONE, points, scale)
 
 
@@ -133,7 +133,7 @@ def _fit(shape: Shape, points: ArrayLike, scale: float | None) -> Fit:
         raise GeometryError(f"fit of {shape.name}: all {len(x)} points are the same")
     scaled = (x - mean) / unit
     try:
-        found, half = settled(solve(shape, scaled, None if scale is None else scale / unit), scaled)
+        found, half = canonical_frame(solve(shape, scaled, None if scale is None else scale / unit), scaled)
         increase = growth(found, scaled, half)
         lengths = np.ones(shape.sizes)
         lengths[[i for i in range(shape.sizes) if i not in shape.ratios]] = unit
@@ -141,7 +141,7 @@ def _fit(shape: Shape, points: ArrayLike, scale: float | None) -> Fit:
     except GeometryError as error:
         wrong = str(error)
         if not wrong.startswith("fit of "):
-            wrong = f"fit of {shape.name}: the points have another shape ({wrong})"
+            wrong = f"fit of {shape.name}: the points do not have this shape ({wrong})"
         raise GeometryError(wrong) from None
     if increase > LOST:
         raise GeometryError(

@@ -1,4 +1,4 @@
-"""Least squares on true distances: the surface of a shape that is nearest to given points."""
+"""Least squares on the points' distances: the surface of a shape that is nearest to given points."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from mjwrap.errors import GeometryError
+from mjwrap.fitting.initial_guesses import guesses
 from mjwrap.fitting.shapes import Array, Nearest, Shape
-from mjwrap.fitting.starts import guesses
 from mjwrap.surfaces.triangles import surface_grid
 
-TRIED = 300  # points that all guesses are tried with
-FEW = 8  # evaluations that a guess is given then
-KEPT = 3  # guesses that are followed to the end
-MANY = 500  # evaluations that these are given
-LARGEST, SMALLEST = 10.0, 1e-3  # sizes of a surface in units of the points' spread
-LOST = 1e4  # growth from which a surface counts as not determined
+TRIED = 300  # number of points with which all guesses are tried
+FEW = 8  # number of evaluations for each guess then
+KEPT = 3  # number of guesses that are iterated to convergence
+MANY = 500  # number of evaluations for each of these
+LARGEST, SMALLEST = 10.0, 1e-3  # limits of a surface's sizes, relative to the points' spread
+LOST = 1e4  # growth from which a surface counts as undetermined
 
 
 class Posed(NamedTuple):
@@ -32,7 +32,7 @@ class Posed(NamedTuple):
 
     @property
     def relative(self) -> NDArray[np.bool_]:
-        """Which sizes are positive, and so change by factors (k,)."""
+        """Return which sizes (k,) are positive, and therefore change by factors."""
         return ~np.isin(np.arange(self.shape.sizes), self.shape.free_sign)
 
     def local(self, x: Array) -> Array:
@@ -57,7 +57,7 @@ class Posed(NamedTuple):
         return there.columns(there.nearest(x), _right_jacobian(turn), Rotation.from_rotvec(turn).as_matrix())
 
     def columns(self, found: Nearest, turned: Array, rotation: Array) -> Array:
-        """Return derivatives of distances; turned, rotation (3, 3): of the frame by the step's turns, and so far."""
+        """Return derivatives of distances; turned, rotation (3, 3): of the frame by the step's turns, and before."""
         around = np.cross(found.point, found.normal) @ turned
         along = found.normal @ rotation.T
         wider = found.slide * np.where(self.relative, self.sizes, 1.0)
@@ -74,14 +74,14 @@ class Posed(NamedTuple):
 def solve(shape: Shape, x: Array, scale: float | None) -> Posed:
     """Return the shape nearest to points x (m, 3), centred and scaled to a mean square distance of one.
 
-    scale: distance from which points count less, or None. Raises `GeometryError` where the points do not determine the
-    shape.
+    scale: distance from which points get less weight, or None. Raises `GeometryError` if the points do not determine
+    the shape.
     """
     some = x[np.linspace(0, len(x) - 1, min(len(x), TRIED)).astype(int)]
     tried = [_descend(Posed(shape, *guess), some, scale, FEW) for guess in guesses(shape, x)]
     tried.sort(key=lambda pair: pair[0])
     best = min((_descend(posed, x, scale, MANY) for _, posed in tried[:KEPT]), key=lambda pair: pair[0])[1]
-    best = _descend(best, x, scale, MANY)[1]  # once more from there, where no turn is left
+    best = _descend(best, x, scale, MANY)[1]  # once more, starting with a turn of zero
     lengths = np.delete(best.sizes, shape.ratios)
     if lengths.max() > LARGEST or (best.sizes[best.relative] < SMALLEST).any():
         raise misshapen(shape)
@@ -89,18 +89,19 @@ def solve(shape: Shape, x: Array, scale: float | None) -> Posed:
 
 
 def misshapen(shape: Shape) -> GeometryError:
-    """Return the error for points whose nearest surface is far larger or thinner than they spread."""
+    """Return the error for points whose nearest surface is much larger or thinner than their spread."""
     return GeometryError(
-        f"fit of {shape.name}: the nearest one is out of all proportion to the points, which lie nearly in a plane or "
-        f"on a line, or show too little of the surface; take points from more of it, or a shape with fewer sizes"
+        f"fit of {shape.name}: the nearest one is much larger or thinner than the points' spread: they lie nearly in a "
+        f"plane or on a line, or cover too little of the surface; take points from more of it, or a shape with fewer "
+        f"sizes"
     )
 
 
 def growth(posed: Posed, x: Array, half_length: float) -> float:
-    """Return by how much a small error of points x (m, 3) can grow elsewhere on the surface; about 1 if they cover it.
+    """Return the factor by which a small error of points x (m, 3) can grow on the surface; about 1 if they cover it.
 
-    Over all small changes of the surface: the largest ratio of its mean square movement everywhere to that at the
-    points. Infinite where a change does not show at the points at all.
+    It is the largest ratio, over all small changes of the surface, of its rms movement everywhere to that at the
+    points; infinite if a change does not move the surface at the points.
     """
     surface = posed.shape.build(posed.sizes, half_length)
     everywhere = posed.nearest(posed.origin + surface_grid(surface).reshape(-1, 3) @ posed.rotation.T)
@@ -108,7 +109,7 @@ def growth(posed: Posed, x: Array, half_length: float) -> float:
     still = np.eye(3)
     all_over, seen = (posed.columns(f, still, still) / np.sqrt(len(f.distance)) for f in (everywhere, here))
     _, size, axes = np.linalg.svd(all_over, full_matrices=False)
-    real = size > 1e-8 * size[0]  # the others turn the surface into itself
+    real = size > 1e-8 * size[0]  # the other turns do not change the surface
     smallest = np.linalg.svd(seen @ (axes[real].T / size[real]), compute_uv=False)[-1]
     return float(1.0 / smallest) if smallest > 1e-12 else np.inf
 
@@ -119,7 +120,7 @@ def _descend(posed: Posed, x: Array, scale: float | None, evaluations: int) -> t
     def derivative(step: Array) -> Array:
         return posed.derivative(step, x)
 
-    jacobian: Any = derivative  # scipy's types know only names of methods
+    jacobian: Any = derivative  # scipy's types allow only names of methods
     found = least_squares(
         lambda step: posed.moved(step).nearest(x).distance,
         np.zeros(posed.shape.unknowns),

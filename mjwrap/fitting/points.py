@@ -13,7 +13,7 @@ from mjwrap.errors import GeometryError, ModelError
 
 Array = NDArray[np.float64]
 Region = Callable[[Array], ArrayLike]
-_MESH = 7  # mjtGeom; only mjcf, system and plugin know mujoco itself
+_MESH = 7  # mjtGeom; this package does not import mujoco
 
 
 def mesh_points(model: Any, geom: str | int, region: Region | None = None, data: Any = None) -> Array:
@@ -22,8 +22,8 @@ def mesh_points(model: Any, geom: str | int, region: Region | None = None, data:
     Args:
         model: a mujoco.MjModel.
         geom: name or id of the geom.
-        region: a function of points (m, 3) that returns which of them to keep (m,), such as `in_box`, `in_ball` and
-            `beyond` make; None for all.
+        region: a function that returns which points (m, 3) to keep (m,), such as those of `in_box`, `in_ball` and
+            `beyond`; None for all.
         data: a mujoco.MjData with up-to-date kinematics, for points in the world; None for points in the frame of the
             geom's body.
 
@@ -79,5 +79,5 @@ def _mesh_geom(model: Any, geom: str | int) -> int:
         return int(index)
     there = ", ".join(names[i] for i in meshes) or "none"
     exists = not isinstance(index, str) and 0 <= int(index) < model.ngeom
-    fault = "is no mesh" if exists else "does not exist"
+    fault = "is not a mesh" if exists else "does not exist"
     raise ModelError(f"geom {geom!r} {fault}; mesh geoms: {there}")

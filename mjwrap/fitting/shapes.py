@@ -1,9 +1,8 @@
 """Signed distances of points to surfaces, with nearest points, normals and derivatives for a fit.
 
-All in the surface's own frame. When a surface changes by a small displacement of its points, the distance d of a
-point outside changes by minus the normal part of the displacement at the nearest point; so derivatives need no
-difference quotients. Unlike the classes in `mjwrap.surfaces` the shapes here have no ends: cylinders and cones are
-endless.
+Everything is in the surface's own frame. If a surface changes by a small displacement of its points, the distance of an
+outside point changes by minus the normal component of the displacement at the nearest point. So derivatives need no
+difference quotients. Unlike the classes in `mjwrap.surfaces`, cylinders and cones are infinite here.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ from mjwrap.surfaces import (
 )
 
 Array = NDArray[np.float64]
-NEWTON = 60  # iterations at most; eight are the rule
+NEWTON = 60  # largest number of iterations; usually eight are enough
 
 
 class Nearest(NamedTuple):
-    """Of points (m, 3): signed distance (m,), outside positive; nearest point and outward normal there (m, 3); slide.
+    """For points (m, 3): signed distance (m,), outside positive; nearest point and outward normal there (m, 3); slide.
 
     slide (m, k): normal displacement of the nearest point for each size.
     """
@@ -42,11 +41,11 @@ class Nearest(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """A class of surfaces as a fit sees it.
+    """A class of surfaces for a fit.
 
-    nearest: (points, sizes) -> Nearest; turns, shifts: about and along which local axes the surface changes, so that a
-    fit may move it; build: (sizes, half length) -> surface; ratios: which sizes are no lengths; free_sign: those that
-    may be negative.
+    nearest: (points, sizes) -> Nearest; turns, shifts: the local axes about and along which a motion changes the
+    surface, so that a fit may move it; build: (sizes, half length) -> surface; ratios: sizes that are not lengths;
+    free_sign: sizes that may be negative.
     """
 
     name: str
@@ -60,12 +59,12 @@ class Shape(NamedTuple):
 
     @property
     def unknowns(self) -> int:
-        """How many numbers a fit determines, and so how many points it needs at least."""
+        """Number of unknowns of a fit, and so the smallest number of points."""
         return len(self.turns) + len(self.shifts) + self.sizes
 
 
 def _unit(vectors: Array) -> tuple[Array, Array]:
-    """Return lengths (m,) and unit vectors; the first axis stands for the direction of a zero vector."""
+    """Return lengths (m,) and unit vectors; the first axis for a zero vector."""
     length = np.linalg.norm(vectors, axis=1)
     fallback = np.zeros(vectors.shape[1])
     fallback[0] = 1.0
@@ -91,10 +90,11 @@ def _cylinder(x: Array, sizes: Array) -> Nearest:
 
 
 def _quadric(x: Array, semi: Array) -> Nearest:
-    """An ellipse (m, 2) or ellipsoid (m, 3): the nearest point is semi^2 x / (t + semi^2), on the surface for one t.
+    """Ellipse (m, 2) or ellipsoid (m, 3): the nearest point is semi^2 x / (t + semi^2), on the surface for one t.
 
-    t is the largest root of |semi x / (t + semi^2)| = 1; Newton on the reciprocal, nearly a straight line, comes from
-    below and never overshoots. Points on the medial axis have no nearest point and are moved off it.
+    t is the largest root of |semi x / (t + semi^2)| = 1. Newton's method on the reciprocal, which is nearly linear,
+    approaches it from below and never overshoots. Points on the medial axis have no unique nearest point and are moved
+    off it.
     """
     square, least = semi * semi, int(np.argmin(semi))
     far = np.abs(x)

@@ -1,5 +1,4 @@
-"""Chooses, among the frames in which a surface looks the same, the one that is turned least from the points' own
-axes."""
+"""Choose, among the frames in which a surface has the same shape, the one turned least from the points' axes."""
 
 from __future__ import annotations
 
@@ -11,14 +10,18 @@ from mjwrap.fitting import shapes
 from mjwrap.fitting.least_squares import SMALLEST, Posed, misshapen
 from mjwrap.fitting.shapes import Array
 
-_LONG = (shapes.CYLINDER, shapes.ELLIPTIC_CYLINDER, shapes.CONE)  # cut off where their points end
+_LONG = (
+    shapes.CYLINDER,
+    shapes.ELLIPTIC_CYLINDER,
+    shapes.CONE,
+)  # shapes that are cut off where their points end
 
 
-def settled(posed: Posed, x: Array) -> tuple[Posed, float]:
-    """Return the same surface in the frame turned least, and its half length: as far as points x (m, 3) reach.
+def canonical_frame(posed: Posed, x: Array) -> tuple[Posed, float]:
+    """Return the same surface in the frame turned least, and its half length, the range of points x (m, 3).
 
-    The origin of cylinders and cones moves to the middle of the points' reach; a cone ends at its apex at the latest.
-    Raises `GeometryError` where the points show no length of them.
+    The origin of cylinders and cones is the middle of the points' range; a cone does not extend beyond its apex.
+    Raises `GeometryError` if the points have no range along the axis.
     """
     if posed.shape in (shapes.ELLIPSOID, shapes.ELLIPTIC_CYLINDER):
         posed = _permuted(posed)

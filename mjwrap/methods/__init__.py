@@ -1,4 +1,4 @@
-"""The paper's three solvers, on NumPy, for comparison: NR, BFGS and Broyden's method (BR).
+"""The three solvers of Muñoz-Pepi et al. (2023), on NumPy, for comparison: NR, BFGS and Broyden's method (BR).
 
 `solve_chain` solves a whole path; `ChainProblem`, a solver of `METHODS` and `iterate` are its parts.
 """

@@ -25,11 +25,11 @@ class Bfgs:
     """x ← x − αHg on ‖f‖², with H from I by the BFGS update of the inverse Hessian.
 
     The gradient g is 2Jᵀf with J by central differences. An update without positive curvature is left out. If a
-    direction does not descend, H starts again from I.
+    direction is not a descent direction, H is reset to I.
 
     Args:
         step: a fixed α (the paper's 1.0), or "armijo", backtracking with a and b.
-        a: share of the decrease predicted by the slope that a step must reach.
+        a: share of the decrease predicted by the slope that a step must achieve.
         b: factor by which a step is shortened.
         max_iterations: largest number of steps.
     """
@@ -46,7 +46,7 @@ class Bfgs:
         return BfgsState(x, f, norm(f), 0, False, gradient, np.eye(len(x)))
 
     def advance(self, problem: ChainProblem, state: BfgsState) -> BfgsState:
-        """Take one step: 10n + 1 evaluations, and one for each backtracking."""
+        """Take one step: 10n + 1 evaluations, and one more for each backtracking."""
         x, g, H = state.x, state.gradient, state.H
         d = -H @ g
         slope = float(g @ d)

@@ -11,7 +11,7 @@ from mjwrap.methods.iteration import State, norm
 from mjwrap.methods.linesearch import derivative_free
 from mjwrap.methods.problem import Array, ChainProblem
 
-RANK_TOLERANCE = 1e-8  # above the 1e-10 that central differences leave in a null direction
+RANK_TOLERANCE = 1e-8  # larger than the error of central differences in a null direction, 1e-10
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class BroydenState(State):
 class Broyden:
     """x ← x + αd, with d = −L⁺f, the shortest least-squares step, and L ← L + θ (y − Ls)sᵀ/(sᵀs).
 
-    L starts as J by central differences. d and every update lie in the row space of L, so that no step goes along
+    L is initially J by central differences. d and every update lie in the row space of L, so that no step goes along
     the null direction (the length of (u', v')).
 
     Args:
@@ -52,7 +52,7 @@ class Broyden:
         return BroydenState(x, f, norm(f), 0, not np.isfinite(f).all(), problem.jacobian(x))
 
     def advance(self, problem: ChainProblem, state: BroydenState) -> BroydenState:
-        """Take one step: one evaluation, and one for each backtracking."""
+        """Take one step: one evaluation, and one more for each backtracking."""
         x, f, L = state.x, state.residual, state.L
         try:
             d = -np.linalg.lstsq(L, f, rcond=RANK_TOLERANCE)[0]

@@ -1,4 +1,4 @@
-"""The iteration that the three methods share: a solver is init, advance, terminate; an outcome carries its status."""
+"""The iteration of the three methods: a solver has `init` and `advance`; `iterate` runs it and returns an `Outcome`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mjwrap.methods.problem import Array, ChainProblem
 
 @dataclass(frozen=True)
 class State:
-    """An iterate: unknowns x (5n,), their residual, its norm, and whether the method can go on from here."""
+    """An iterate: unknowns x (5n,), their residual, its norm, and whether the method can continue."""
 
     x: Array
     residual: Array
@@ -25,11 +25,11 @@ S = TypeVar("S", bound=State)
 
 
 class Solver(Protocol, Generic[S]):
-    """A method with its options: `init` makes the first state, `advance` the next one."""
+    """A method with its options: `init` returns the first state, `advance` the next one."""
 
     @property
     def max_iterations(self) -> int:
-        """Steps after which to give up."""
+        """Largest number of steps."""
         ...
 
     def init(self, problem: ChainProblem, x: Array) -> S:
@@ -37,17 +37,17 @@ class Solver(Protocol, Generic[S]):
         ...
 
     def advance(self, problem: ChainProblem, state: S) -> S:
-        """Take one step; neither raises nor terminates."""
+        """Take one step; it does not raise and does not test for convergence."""
         ...
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How an iteration ended.
+    """The result of an iteration.
 
     Attributes:
         x: (5n,) the last finite unknowns.
-        error: ‖f‖ or ‖h‖ there.
+        error: ‖f‖ or ‖h‖ at x.
         iterations: number of steps.
         evaluations: number of evaluations.
         converged: whether error is at most tol.
@@ -63,7 +63,7 @@ class Outcome:
 def iterate(solver: Solver[Any], problem: ChainProblem, x: Array, tol: float = 1e-10) -> Outcome:
     """Run a solver until the norm of its residual is at most tol, or until it is stuck or out of iterations.
 
-    An iterate that is not finite ends the iteration at the one before.
+    If an iterate is not finite, the iteration ends with the previous one.
 
     Args:
         solver: one of `METHODS`.
@@ -72,7 +72,7 @@ def iterate(solver: Solver[Any], problem: ChainProblem, x: Array, tol: float = 1
         tol: largest norm of the residual.
 
     Returns:
-        The last unknowns, with their residual and cost.
+        The last unknowns, with error and cost.
     """
     before = problem.evaluations
     with np.errstate(all="ignore"):

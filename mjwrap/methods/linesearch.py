@@ -9,13 +9,13 @@ import numpy as np
 from mjwrap.methods.iteration import norm
 from mjwrap.methods.problem import Array
 
-SMALLEST_STEP = 2.0**-40  # a search that gets here has stalled
+SMALLEST_STEP = 2.0**-40  # a search with a shorter step has stalled
 
 
 def armijo(
     residual: Callable[[Array], Array], x: Array, d: Array, phi: float, slope: float, a: float, b: float
 ) -> tuple[Array, Array] | None:
-    """Return the first x + αd, α = 1, b, b², …, with ‖f‖² ≤ phi + a α slope, and its residual; None where none has.
+    """Return the first x + αd, α = 1, b, b², …, with ‖f‖² ≤ phi + a α slope, and its residual; None if there is none.
 
     phi = ‖f(x)‖², slope = its derivative along d.
     """
@@ -40,7 +40,7 @@ def derivative_free(
     rho: float,
     shrink: float,
 ) -> tuple[Array, Array] | None:
-    """Return a point x + αd and its residual by the search (29) of Li and Fukushima; None where none is accepted.
+    """Return a point x + αd and its residual by the search (29) of Li and Fukushima; None if none is accepted.
 
     α = 1 is taken at once if ‖f(x + d)‖ ≤ ρ‖f‖ − σ₂‖d‖²; else the first α = 1, shrink, shrink², … with
     ‖f(x + αd)‖ ≤ (1 + η_k)‖f‖ − σ₁‖αd‖², η_k = 1/(k + 1)². error = ‖f(x)‖; k counts iterations from zero.

@@ -14,8 +14,8 @@ from mjwrap.methods.problem import Array, ChainProblem
 class NewtonRaphson:
     """x ← x − (JᵀJ + λI)⁻¹Jᵀf (22), J by central differences at every step.
 
-    lam: λ, the paper's 0.08, 0.1 or 0.5. The term makes the convergence linear, by λ/(σ² + λ) a step with σ the least
-    singular value of J other than zero.
+    lam: λ, the paper's 0.08, 0.1 or 0.5. The term makes the convergence linear, with the factor λ/(σ² + λ) per step,
+    where σ is the smallest nonzero singular value of J.
     """
 
     lam: float = 0.08

@@ -1,14 +1,14 @@
 """The paper's unknowns and residuals for a row of cylinders and spheres, with a counter of evaluations.
 
 Unknowns (19) of one obstacle are (u, v, u', v', l): chart coordinates of the first contact point P, the direction of
-the geodesic there, and its arc length. v and l are in radii, so that every obstacle looks like the paper's cylinder:
+the geodesic there, and its arc length. v and l are in radii, so that all obstacles look like the paper's cylinder:
 
     cylinder   r(u, v) = R (cos u, sin u, v)
     sphere     r(u, v) = R (cos v cos u, cos v sin u, sin v)
 
 Unit speed (III-C): (u', v') is scaled by the first fundamental form inside the residual, t = r_u u' + r_v v' over its
-norm. Only its direction matters, l is the arc length, and the Jacobian has one null column direction per obstacle (the
-length of (u', v')), along which none of the methods steps.
+norm. Only its direction has an effect, l is the arc length, and the Jacobian has one null direction per obstacle (the
+length of (u', v')), along which no method makes a step.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _unit(a: Array) -> Array:
-    # no abs, hypot or norm: the residual stays analytic, so that a complex step differentiates it exactly
+    # without abs, hypot or norm the residual is analytic, so that a complex step differentiates it exactly
     return a / np.sqrt(_dot(a, a))[..., None]
 
 
@@ -54,7 +54,7 @@ class Geometry:
 
 
 class ChainProblem:
-    """Touched obstacles in a row between two fixed points: residuals, their Jacobian, the length.
+    """A row of touched obstacles between two fixed points: residuals, their Jacobian, and the length.
 
     Args:
         origin: (3,) world [m].
@@ -80,7 +80,7 @@ class ChainProblem:
         residual: str = "tangency",
     ) -> None:
         if residual not in RESIDUALS:
-            raise GeometryError(f"residual {residual!r} is none of: {', '.join(RESIDUALS)}")
+            raise GeometryError(f"residual must be one of {', '.join(RESIDUALS)}, not {residual!r}")
         self.n = len(surfaces)
         self.residual = residual
         self.evaluations = 0
@@ -191,7 +191,7 @@ class ChainProblem:
         return (f[: len(x)] - f[len(x) :]).T / (2.0 * h)
 
     def tangency_error(self, x: Array) -> float:
-        """Return ‖f‖ (30) whatever the residual solved for, infinite where it has no value; not counted."""
+        """Return ‖f‖ (30), also if the residual is h; infinite if it has no value. Not counted as an evaluation."""
         with np.errstate(all="ignore"):
             g = self.geometry(x)
             e = _unit(self.straights(g))
@@ -200,7 +200,7 @@ class ChainProblem:
         return error if np.isfinite(error) else float("inf")
 
     def length(self, x: Array) -> float:
-        """Return the length (1) [m]: straight segments and arcs, an arc of a lifted obstacle being negative."""
+        """Return the length (1) [m]: straight segments and arcs; the arc of a lifted obstacle is negative."""
         g = self.geometry(x)
         d = self.straights(g)
         return float(np.sqrt(_dot(d, d)).sum() + g.arc.sum())
@@ -208,12 +208,14 @@ class ChainProblem:
 
 def _radius(surface: Surface) -> float:
     if not isinstance(surface, (Cylinder, Sphere)):
-        raise GeometryError(f"the paper's methods know Cylinder and Sphere, not {type(surface).__name__}")
+        raise GeometryError(
+            f"the paper's methods support only Cylinder and Sphere, not {type(surface).__name__}"
+        )
     return float(surface.radius)
 
 
 def _frame(p: Array, d: Array) -> Array:
-    """Return a rotation whose first axis is along p and whose second is as near to d as it can be."""
+    """Return a rotation whose first axis is along p and whose second is as near to d as possible."""
     n = p / np.sqrt(p @ p)
     a = d - (d @ n) * n
     if not a @ a > 1e-24:

@@ -21,9 +21,9 @@ METHODS: dict[str, type[NewtonRaphson] | type[Bfgs] | type[Broyden]] = {
 
 
 def make_solver(method: str, **options: Any) -> Solver[Any]:
-    """Return a solver by its name in `METHODS` with its own options; `GeometryError` names those that exist."""
+    """Return a solver by its name in `METHODS` with its options; `GeometryError`, which lists them, if unknown."""
     if method not in METHODS:
-        raise GeometryError(f"method {method!r} is none of: {', '.join(METHODS)}")
+        raise GeometryError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
     kind = METHODS[method]
     known = [field.name for field in dataclasses.fields(kind)]
     for name, value in options.items():

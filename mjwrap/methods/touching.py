@@ -1,4 +1,4 @@
-"""The scene of one path, and the state of its outer loop: which obstacles are touched, and at which points."""
+"""The scene of one path, and the state of its outer loop: touched obstacles and contact points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mjwrap.methods.iteration import Outcome, Solver, iterate
 from mjwrap.methods.problem import Array, ChainProblem
 from mjwrap.surfaces import Sphere, Surface
 
-DEPTH = 1e-12  # of a radius: a segment that dips less deep shortens the path by less than rounding does
+DEPTH = 1e-12  # relative to a radius: a shallower dip of a segment changes the length by less than rounding
 
 Start = tuple[Array, Array, Array, Array]
 
@@ -37,7 +37,9 @@ class Scene:
         self.insertion = _checked("insertion", insertion, (3,))
         self.positions = _checked("positions", positions, (self.n, 3))
         self.rotations = _checked("rotations", rotations, (self.n, 3, 3))
-        everything = self.problem(np.ones(self.n, dtype=bool))  # raises for an unknown surface or residual
+        everything = self.problem(
+            np.ones(self.n, dtype=bool)
+        )  # raises an error for an unknown surface or residual
         self.radii = everything.radii
 
     def problem(self, active: Array) -> ChainProblem:
@@ -53,7 +55,7 @@ class Scene:
         )
 
     def nearest(self, k: int, a: Array, b: Array) -> tuple[float, Array, Array]:
-        """Return how deep the segment from a to b dips below obstacle k [radii], the surface point there, and b − a."""
+        """Return the depth of the segment from a to b below obstacle k [radii], the surface point there, and b − a."""
         radius = float(self.radii[k])
         d = b - a
         across = np.eye(3)
@@ -67,7 +69,7 @@ class Scene:
         distance = float(np.sqrt(out @ out))
         if distance > 1e-12 * radius:
             normal = out / distance
-        else:  # through the very middle: any way round is as good
+        else:  # exactly through the middle: all directions are equal
             normal = np.cross(direction, across @ np.eye(3)[np.argmin(np.abs(d))])
             size = np.sqrt(normal @ normal)
             normal = normal / size if size > 0.0 else self.rotations[k][:, 0]
@@ -86,7 +88,7 @@ def _checked(name: str, value: Array, shape: tuple[int, ...]) -> Array:
 
 @dataclass
 class TouchState:
-    """An iterate of the outer loop: contacts of every obstacle, touched or not."""
+    """An iterate of the outer loop: contacts of all obstacles, touched or not."""
 
     P: Array
     t: Array
@@ -114,7 +116,7 @@ class TouchState:
         return TouchState(self.P.copy(), self.t.copy(), self.s.copy(), self.active.copy())
 
     def solve(self, scene: Scene, solver: Solver[Any], tol: float) -> Outcome:
-        """Solve the coupled system over the touched obstacles and move there."""
+        """Solve the coupled system over the touched obstacles, and take its solution."""
         problem = scene.problem(self.active)
         x = problem.unknowns(self.P[self.active], self.t[self.active], self.s[self.active])
         outcome = iterate(solver, problem, x, tol)
@@ -123,7 +125,7 @@ class TouchState:
         return outcome
 
     def contacts(self, scene: Scene) -> tuple[Array, float]:
-        """Return the last contact points Q (n, 3), those of untouched obstacles at P, and the tangency error."""
+        """Return the last contact points Q (n, 3), equal to P for untouched obstacles, and the tangency error."""
         Q = self.P.copy()
         if not self.active.any():
             return Q, 0.0
@@ -146,7 +148,7 @@ class TouchState:
         return [*out, (here, scene.insertion, passed)]
 
     def touch_down(self, scene: Scene) -> bool:
-        """Take in every untouched obstacle below whose surface a segment dips; place the others next to the path."""
+        """Add every untouched obstacle below whose surface a segment passes; move the others next to the path."""
         found = False
         for a, b, passed in self.segments(scene):
             for k in passed:

@@ -1,4 +1,4 @@
-"""Solves a whole path with one of the paper's methods: finds the touched obstacles and solves the coupled system."""
+"""Solve a whole path with one of the paper's methods: find the touched obstacles and solve the coupled system."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mjwrap.surfaces import Surface
 
 @dataclass(frozen=True)
 class MethodResult:
-    """A path of one of the paper's methods, found or not.
+    """The result of one of the paper's methods, converged or not.
 
     On an untouched obstacle P = Q is the point next to the path, t the path's direction there, and s = 0.
 
@@ -28,8 +28,8 @@ class MethodResult:
         active: (n,) whether each obstacle is touched.
         Q: (n, 3) last contact points, world [m].
         length: [m].
-        iterations: of the method.
-        evaluations: of the residual of the whole path.
+        iterations: iterations of the method.
+        evaluations: evaluations of the residual of the whole path.
         tangency_error: ‖f‖ (30) over the touched obstacles.
         residual_error: norm of the residual that was solved, ‖h‖ with `residual="normals_binormals"`.
         converged: tangency_error is at most tol, and no obstacle has to be dropped or added.
@@ -72,7 +72,7 @@ def solve_chain(
         surfaces: n of `Cylinder`, `Sphere`.
         positions: (n, 3) of their frames, world [m].
         rotations: (n, 3, 3) surface to world.
-        start: P (n, 3), t (n, 3), s (n,), active (n,) of a path nearby; None for the paper's first guess, with every
+        start: P (n, 3), t (n, 3), s (n,), active (n,) of a similar path; None for the paper's first guess, with every
             obstacle touched.
         tol: largest norm of the residual.
         residual: "tangency" or "normals_binormals", as in `ChainProblem`.
@@ -82,7 +82,7 @@ def solve_chain(
         The path; if it was not found, `converged` is False.
 
     Raises:
-        GeometryError: the input describes no problem.
+        GeometryError: an argument is not valid.
     """
     solver = make_solver(method, **options)
     scene = Scene(origin, insertion, surfaces, positions, rotations, residual)
@@ -91,7 +91,7 @@ def solve_chain(
     outcome: Outcome | None = None
     settled = False
     given_up = np.zeros(scene.n, dtype=bool)
-    for _ in range(2 * scene.n + 6):  # drop and take in; a chain that goes on longer is cycling
+    for _ in range(2 * scene.n + 6):  # rounds of removing and adding obstacles; more rounds would be a cycle
         before = path.copy()
         solved = True
         if path.active.any():
@@ -102,7 +102,7 @@ def solve_chain(
         lifted = path.active & (path.s < 0.0)
         if (
             not solved
-        ):  # perhaps because an obstacle is far from touching; but try to do without each only once
+        ):  # perhaps because an obstacle should not be touched; try without each obstacle only once
             lifted &= ~given_up
             if not lifted.any():
                 break

@@ -1,7 +1,7 @@
-"""Reads the muscles that an MjModel declares: what pulls, along which sites and geoms, by which law.
+"""Read the muscles that an MjModel declares, with their actuators, routes and laws.
 
-Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendon, as it stands; and `<custom>` tuples
-whose name contains "mjwrap", which add what MuJoCo's schema cannot say. Nothing here changes the model.
+Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendon; and `<custom>` tuples whose name
+contains "mjwrap", for what MuJoCo's schema cannot express. Reading does not change the model.
 """
 
 from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, keeps_state

@@ -1,7 +1,7 @@
-"""Tells which native actuators mjwrap can take over, and reads the muscle curves that they carry.
+"""Decide which native actuators mjwrap can take over, and read their muscle curves.
 
-Most fields of an actuator are indexed by its id. Some actuators have several controls and outputs, so what belongs to
-these (control limits; gear, length range, acc0) is indexed by `actuator_ctrladr` and `actuator_outadr`.
+Most fields of an actuator are indexed by its id. Some actuators have several controls and outputs, so the fields of
+these (control limits; gear, length range, acc0) are indexed by `actuator_ctrladr` and `actuator_outadr`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _BIASES = [
 
 _NO_BIAS, _MUSCLE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
 _DYN = mujoco.mjtDyn
-# dyntypes whose next activation the kernels can compute, for actuators with `actearly`, which act with that one
+# dyntypes whose next activation the kernels can compute: actuators with `actearly` use the next activation
 ACTEARLY_DYNAMICS = {
     int(_DYN.mjDYN_INTEGRATOR): actearly.INTEGRATOR,
     int(_DYN.mjDYN_FILTER): actearly.FILTER,
@@ -49,12 +49,12 @@ def pulled_tendon(model: mujoco.MjModel, actuator: int) -> int:
 
 
 def is_fixed(model: mujoco.MjModel, tendon: int) -> bool:
-    """Return whether a tendon is a sum of joint angles rather than a string."""
+    """Return whether a tendon is fixed, which is a sum of joint angles and not a string."""
     return int(model.wrap_type[model.tendon_adr[tendon]]) == int(mujoco.mjtWrap.mjWRAP_JOINT)
 
 
 def keeps_state(model: mujoco.MjModel, actuator: int) -> bool:
-    """Return whether an actuator holds activation and fibre length for mjwrap: `dyntype="user" actdim="2"`."""
+    """Return whether an actuator stores activation and fibre length for mjwrap: `dyntype="user" actdim="2"`."""
     user = int(model.actuator_dyntype[actuator]) == int(mujoco.mjtDyn.mjDYN_USER)
     return user and int(model.actuator_actnum[actuator]) == 2
 
@@ -63,26 +63,26 @@ def unfit_reason(model: mujoco.MjModel, actuator: int) -> str | None:
     """Return why an actuator cannot drive a muscle of mjwrap, or None."""
     kinds = int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
     if kinds[0] not in _GAINS or kinds[1] not in _BIASES:
-        return "its gain or bias is neither fixed, affine nor a muscle's"
+        return "its gain or bias is not fixed, affine or muscle"
     if int(model.actuator_plugin[actuator]) >= 0:
         return "it belongs to a plugin"
     keeps = keeps_state(model, actuator)
     if model.actuator_actearly[actuator] and int(model.actuator_actnum[actuator]) > 0:
         if int(model.actuator_dyntype[actuator]) not in ACTEARLY_DYNAMICS:
-            return "its activation acts early (actearly) and has other dynamics than integrator, filter or muscle"
+            return "it has actearly, and its dynamics are not integrator, filter or muscle"
         if float(model.actuator_delay[actuator]) > 0.0:
-            return "its activation acts early (actearly) and its control with a delay"
+            return "it has actearly, and its control has a delay"
     if int(model.actuator_actnum[actuator]) > 1 and not keeps:
-        return "it has several activation states, but not as dyntype='user' actdim='2' keeps them for mjwrap"
+        return "it has several activation states, but not with dyntype='user' actdim='2', as mjwrap needs"
     if keeps and model.actuator_actlimited[actuator]:
-        return "its actrange would clamp the fibre length among its states; leave actlimited out"
+        return "its actrange would limit the fibre length, which is one of its states; leave actlimited out"
     if (keeps or int(model.actuator_actnum[actuator]) == 0) and float(model.actuator_delay[actuator]) > 0.0:
-        return "its control acts with a delay and MuJoCo does not integrate its activation"
+        return "its control has a delay, and MuJoCo does not integrate its activation"
     return None
 
 
 def tendon_reason(model: mujoco.MjModel, actuator: int) -> str | None:
-    """Return why an actuator pulls no spatial tendon, or None."""
+    """Return why an actuator does not pull a spatial tendon, or None."""
     if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
         return "it does not pull a tendon"
     return "its tendon is fixed, not spatial" if pulled_tendon(model, actuator) < 0 else None
@@ -106,7 +106,7 @@ def curves_reason(model: mujoco.MjModel, actuator: int) -> str | None:
     if model.tendon_actfrclimited[tendon]:
         return "its tendon limits the forces of its actuators together (actuatorfrcrange)"
     if int(model.actuator_biastype[actuator]) not in (_NO_BIAS, _MUSCLE_BIAS):
-        return "its bias is not a muscle's"
+        return "its bias is not that of a muscle"
     return None
 
 
@@ -115,7 +115,7 @@ def native_reason(model: mujoco.MjModel, rest: mujoco.MjData, actuator: int) -> 
     return (
         curves_reason(model, actuator)
         or unfit_reason(model, actuator)
-        or ("its activation states are a user's own" if keeps_state(model, actuator) else None)
+        or ("its activation states are defined by the user" if keeps_state(model, actuator) else None)
         or _inside_reason(model, rest, int(model.actuator_trnid[actuator, 0]))
     )
 
@@ -131,8 +131,8 @@ def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> s
         if side >= 0 and side_is_inside(model, rest, index, side):
             site = name_of(model, OBJ.mjOBJ_SITE, side)
             return (
-                f"whether its tendon runs inside {geom} changes with the pose: side site '{site}', inside it at the "
-                f"reference pose, moves relative to it"
+                f"whether its tendon runs inside {geom} changes with the pose: side site '{site}', which is inside at "
+                f"the reference pose, moves relative to it"
             )
         for end in ends:
             if end_is_inside(model, rest, index, end):
@@ -142,7 +142,7 @@ def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> s
 
 
 def mujoco_law(model: mujoco.MjModel, actuator: int) -> MuJoCoMuscle:
-    """Return the native curves of a muscle actuator; `ModelError` where they are undefined."""
+    """Return the native curves of a muscle actuator; `ModelError` if they are undefined."""
     output = int(model.actuator_outadr[actuator])
     prm = [float(p) for p in model.actuator_gainprm[actuator, :9]]
     passive = None
@@ -157,7 +157,7 @@ def mujoco_law(model: mujoco.MjModel, actuator: int) -> MuJoCoMuscle:
         low, high = (float(x) for x in model.actuator_forcerange[actuator])
         if low == high == 0.0:
             raise ModelError(
-                "its force range is 0 to 0, as MuscleSystem leaves it: call release() on the MuscleSystem that holds "
+                "its force range is 0 to 0, as set by a MuscleSystem: call release() on the MuscleSystem of "
                 "the model, or set actuator_forcelimited to 0"
             )
     return MuJoCoMuscle(

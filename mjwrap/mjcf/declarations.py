@@ -1,4 +1,4 @@
-"""Dataclasses for what a model declares: muscles, their routes and the stops on these; ids are MuJoCo's."""
+"""Dataclasses of a model's declarations: muscles, their routes, and the stops of these; ids are MuJoCo's."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from mjwrap.surfaces import Surface
 
 @dataclass(frozen=True)
 class Node:
-    """One stop of a route: a via site, or the surface in a geom's frame with, perhaps, a site as hint at its side.
+    """One stop of a route: a via site, or a surface in a geom's frame, which may have a site as hint.
 
-    inside: the string is held to the solid, as by a side site inside, rather than kept out of it.
-    sizes: the numeric that gives the surface its sizes, -1 where the geom does.
+    inside: the string must meet the solid, as with a side site inside, and is not kept out of it.
+    sizes: the numeric that gives the surface's sizes, -1 if the geom gives them.
     """
 
     site: int = -1
@@ -27,7 +27,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Route:
-    """An unbroken stretch of string: origin site, nodes, insertion site; weight: its share in the muscle's length."""
+    """An unbroken piece of string: origin site, nodes, insertion site; weight: its factor in the muscle's length."""
 
     origin: int
     nodes: tuple[Node, ...]
@@ -53,7 +53,7 @@ class MuscleDeclaration:
     """One muscle of a model: ids are MuJoCo's.
 
     name; routes: one, or several joined by pulleys; parameters: the law's dataclass; actuator, tendon: id or -1;
-    activation: the dynamics of the activation, where mjwrap integrates it itself.
+    activation: the activation dynamics, if mjwrap integrates the activation.
     """
 
     name: str
@@ -85,7 +85,7 @@ class MuscleDeclaration:
 
     @property
     def geoms(self) -> list[int]:
-        """Ids of the geoms that carry the wrapping surfaces, in order."""
+        """Ids of the geoms of the wrapping surfaces, in order."""
         return [node.geom for route in self.routes for node in route.nodes if node.geom >= 0]
 
     @property
@@ -96,7 +96,7 @@ class MuscleDeclaration:
 
 @dataclass(frozen=True)
 class Declarations:
-    """All muscles of a model, and the native muscle actuators that cannot be taken over, each with the reason."""
+    """All muscles of a model, and the native muscle actuators that cannot be taken over, with the reasons."""
 
     muscles: list[MuscleDeclaration]
     native: dict[str, str] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Tells which sites lie inside a geom that a tendon wraps: a side site there makes MuJoCo hold the path inside."""
+"""Test which sites lie inside a wrapped geom: with a side site inside, MuJoCo holds the path inside."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 POSES = 64
-_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)  # hinges come after it
+_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)  # the type of hinges is larger
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 
 
 def is_beside(model: mujoco.MjModel, geom: int, site: int) -> bool:
-    """Return whether a site never moves relative to a geom, as their bodies are the same or welded together."""
+    """Return whether a site cannot move relative to a geom, because their bodies are the same or welded together."""
     first, second = int(model.geom_bodyid[geom]), int(model.site_bodyid[site])
     if first == second:
         return True
@@ -24,7 +24,7 @@ def is_beside(model: mujoco.MjModel, geom: int, site: int) -> bool:
 
 
 def end_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int) -> bool:
-    """Return whether a string that ends at a site ends inside a sphere, or a cylinder of any length, at these poses."""
+    """Return whether a site lies inside a sphere geom, or a cylinder geom of any length, at the given poses."""
     local = _local(poses, geom, site)
     if int(model.geom_type[geom]) == _CYLINDER:
         local = local[:2]
@@ -32,18 +32,19 @@ def end_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: 
 
 
 def side_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int) -> bool:
-    """Return whether a side site is inside as MuJoCo judges it: nearer than the radius to the geom's centre.
+    """Return whether a side site counts as inside in MuJoCo: nearer to the geom's centre than the radius.
 
-    That holds for a cylinder too: a side site on its axis, but farther along, is not inside.
+    This also applies to a cylinder: a side site on its axis that is farther from the centre is not inside.
     """
     return bool(np.linalg.norm(_local(poses, geom, site)) < model.geom_size[geom, 0] < np.inf)
 
 
 def shares_inside(model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
-    """Return for pairs of geom and end point (site) at which share of poses the end is inside (n,).
+    """Return, for pairs of geom and end point (site), the share of poses at which the end is inside (n,).
 
-    Poses: joints anywhere in their ranges; those without limits, ball and free joints stay at the reference. Each joint
-    draws by itself, seeded by what it is, so that the answer stays the same where the model is part of a larger one.
+    Poses: joints at random in their ranges; joints without limits, ball and free joints stay at the reference. Each
+    joint has a random generator of its own, seeded by its properties, so that the result is the same if the model is
+    part of a larger one.
     """
     inside = np.zeros(len(pairs))
     if not pairs:

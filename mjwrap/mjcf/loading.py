@@ -1,4 +1,4 @@
-"""Loads a model from a file; errors say what is wrong and which models are there."""
+"""Load a model from a file; errors list the models that exist."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from mjwrap.mjcf.names import listed
 
 
 def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
-    """Load an MJCF or MJB file; `ModelError` with MuJoCo's reason where that fails.
+    """Load an MJCF or MJB file; `ModelError`, with MuJoCo's reason, if that fails.
 
-    What MuJoCo warns of becomes a Python warning.
+    Warnings of MuJoCo become Python warnings.
     """
     file = Path(path)
     if not file.is_file():
@@ -42,7 +42,7 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
 
 @contextmanager
 def _collected_warnings() -> Iterator[list[str]]:
-    """Collect MuJoCo's warnings for the length of a with block; it would write them into the working folder."""
+    """Collect MuJoCo's warnings inside a with block; otherwise MuJoCo writes them to the working folder."""
     found: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(found.append)

@@ -1,23 +1,23 @@
-"""Writes and reads the private marks that mjwrap leaves in arrays of MuJoCo's own.
+"""Write and read the private marks of mjwrap in arrays of MuJoCo.
 
-MuJoCo has no place for another program's notes, and a model can be copied, pickled, saved as XML or MJB, or attached to
-another one. So what mjwrap must know again afterwards stands in entries that MuJoCo carries along and does not use:
+MuJoCo has no place for data of another program, and a model can be copied, pickled, saved as XML or MJB, or attached to
+another one. So mjwrap stores what it must know afterwards in entries that MuJoCo keeps and does not use:
 
 - `actuator_gainprm[i, 9]` and `actuator_biasprm[i, 9]`: the lowest and highest force that actuator i had before it was
   disabled (∓mjMAXVAL: no limits). Written by `model/takeover.py` into a model and by `plugin/spec/actuators.py` into a
-  spec; read by both, `plugin/blocks/image.py` and `plugin/callbacks/follow.py`.
-- `actuator_forcerange[i]`, 0 to 0 in a model and 0 to 1e-12 in a spec: actuator i is disabled. By and for the same.
-- `actuator_dynprm[i, 9]`, 1: gain and bias of actuator i were a muscle's. By and for `plugin/spec/tendons.py`.
-- `wrap_prm[tendon_adr[t]]`, where `tendon_num[t]` is 0: how many stops tendon t had. By and for the same.
-- `tendon_width[t]` below 1e-7 m: hidden; its own width is 2²⁶ times that. Written by `plugin/spec/tendons.py`, read by
-  it and by `plugin/callbacks/drawing.py`.
-- the name of a plugin's instance, ending in "mjwrap": its configuration says what mjwrap drives. Written by
-  `plugin/spec/instance.py`, read by `plugin/spec/configuration.py`; a body names it too, so that `attach` keeps it.
+  spec; read by both, `plugin/blocks/image.py` and `plugin/callbacks/sync.py`.
+- `actuator_forcerange[i]`, 0 to 0 in a model and 0 to 1e-12 in a spec: actuator i is disabled. Same modules.
+- `actuator_dynprm[i, 9]`, 1: gain and bias of actuator i were a muscle's. Used by `plugin/spec/tendons.py`.
+- `wrap_prm[tendon_adr[t]]`, if `tendon_num[t]` is 0: the number of stops that tendon t had. Same module.
+- `tendon_width[t]` below 1e-7 m: hidden; the original width is 2²⁶ times that. Written by `plugin/spec/tendons.py`,
+  read by it and by `plugin/callbacks/drawing.py`.
+- the name of a plugin's instance, ending in "mjwrap": its configuration names the muscles. Written by
+  `plugin/spec/instance.py`, read by `plugin/spec/configuration.py`; a body refers to it, so that `attach` keeps it.
 
-Why these are free in MuJoCo 3.11 to 4.0: a row of gainprm, biasprm or dynprm has 10 numbers (mjNGAIN, mjNBIAS, mjNDYN).
-Of the kinds of actuators that mjwrap takes over, fixed ones use 1, affine ones 3 and muscles 9 of gain and bias; a
-muscle's dynamics use 3 of dynprm. `wrap_prm` of a site is not read. A width is only drawn. `tests/test_marks.py` checks
-it against the installed MuJoCo.
+MuJoCo 3.11 to 4.0 does not use these entries: a row of gainprm, biasprm or dynprm has 10 numbers (mjNGAIN, mjNBIAS,
+mjNDYN). Of the actuators that mjwrap takes over, fixed ones use 1, affine ones 3 and muscles 9 numbers of gain and
+bias; a muscle's dynamics use 3 of dynprm. `wrap_prm` of a site is not read. A width is only drawn.
+`tests/test_marks.py` checks this with the installed MuJoCo.
 """
 
 from __future__ import annotations
@@ -27,14 +27,16 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-COLUMN = 9  # the last of gainprm, biasprm and dynprm
-PLUGIN_NAME = "mjwrap.muscles"  # of the engine plugin
-PLUGIN_INSTANCE = "mjwrap"  # of its instance, behind the prefix of the model that it was attached with
-# force range [N] of a disabled actuator in an MjSpec: the compiler accepts no 0 to 0, to_xml writes nothing smaller,
-# and a muscle's force is never positive, so it is clamped to zero
+COLUMN = 9  # the last column of gainprm, biasprm and dynprm
+PLUGIN_NAME = "mjwrap.muscles"  # name of the engine plugin
+PLUGIN_INSTANCE = "mjwrap"  # name of its instance, after the prefix of an attached model
+# force range [N] of a disabled actuator in an MjSpec: the compiler rejects 0 to 0, to_xml writes nothing smaller,
+# and a muscle's force is never positive, so that it becomes zero
 DISABLED_RANGE = (0.0, 1e-12)
-HIDDEN_FACTOR = 2.0**-26  # on a tendon's width: a power of two, so that its own width comes back to the bit
-HIDDEN_BELOW = 1e-7  # [m] (to_xml writes no width below 1e-12 m, and the compiler takes none of 0)
+HIDDEN_FACTOR = (
+    2.0**-26
+)  # factor on a tendon's width: a power of two, so that the original width is restored exactly
+HIDDEN_BELOW = 1e-7  # [m] (to_xml writes no width below 1e-12 m, and the compiler does not accept 0)
 _CURVES = int(mujoco.mjtGain.mjGAIN_MUSCLE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
 _NO_CURVES = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtBias.mjBIAS_NONE)
 
@@ -67,12 +69,12 @@ def limit_marks(model: mujoco.MjModel, actuator: int) -> tuple[float, float]:
 
 
 def is_disabled(model: mujoco.MjModel, actuator: int) -> bool:
-    """Return whether an actuator's force is clamped to 0."""
+    """Return whether an actuator's force is limited to 0."""
     return bool(model.actuator_forcelimited[actuator]) and not model.actuator_forcerange[actuator].any()
 
 
 def disabled_actuators(model: mujoco.MjModel) -> dict[int, ForceLimits]:
-    """Return the disabled actuators of a model with the limits that each had before."""
+    """Return the disabled actuators of a model with their original limits."""
     marks = {i: limit_marks(model, i) for i in range(len(model.actuator_gainprm)) if is_disabled(model, i)}
     return {
         i: ForceLimits(high < mujoco.mjMAXVAL, low, high) for i, (low, high) in marks.items() if low < high
@@ -80,26 +82,26 @@ def disabled_actuators(model: mujoco.MjModel) -> dict[int, ForceLimits]:
 
 
 def disable_force(model: mujoco.MjModel, actuator: int, limits: ForceLimits) -> None:
-    """Clamp an actuator's force to 0, and mark the limits that it had."""
+    """Limit an actuator's force to 0, and store its original limits as marks."""
     model.actuator_gainprm[actuator, COLUMN], model.actuator_biasprm[actuator, COLUMN] = limits[1:]
     model.actuator_forcelimited[actuator], model.actuator_forcerange[actuator] = 1, 0.0
 
 
 def enable_force(model: mujoco.MjModel, actuator: int, limits: ForceLimits) -> None:
-    """Give a disabled actuator its limits back, and remove the marks."""
+    """Restore the limits of a disabled actuator, and remove the marks."""
     model.actuator_gainprm[actuator, COLUMN] = model.actuator_biasprm[actuator, COLUMN] = 0.0
     model.actuator_forcelimited[actuator] = limits.limited
     model.actuator_forcerange[actuator] = limits[1:] if limits.limited else 0.0
 
 
 def disable_element(element: mujoco.MjsActuator, limits: ForceLimits) -> None:
-    """Do what `disable_force` does, to an actuator of an MjSpec."""
+    """Disable an actuator of an MjSpec, as `disable_force` does in a model."""
     element.gainprm[COLUMN], element.biasprm[COLUMN] = limits[1:]
     element.forcelimited, element.forcerange = 1, DISABLED_RANGE
 
 
 def enable_element(element: mujoco.MjsActuator) -> None:
-    """Do what `enable_force` does, to an actuator of an MjSpec; one that is not disabled stays as it is."""
+    """Enable an actuator of an MjSpec, as `enable_force` does in a model; does nothing if it is not disabled."""
     if not np.array_equal(element.forcerange, DISABLED_RANGE):
         return
     low, high = float(element.gainprm[COLUMN]), float(element.biasprm[COLUMN])
@@ -109,7 +111,7 @@ def enable_element(element: mujoco.MjsActuator) -> None:
 
 
 def zero_disabled_ranges(model: mujoco.MjModel) -> None:
-    """Make the force ranges of actuators that were disabled in an MjSpec 0 to 0, as in a model."""
+    """Set the force ranges of actuators that were disabled in an MjSpec to 0 to 0, as in a model."""
     disabled = (model.actuator_forcerange == DISABLED_RANGE).all(axis=1)
     model.actuator_forcerange[disabled] = 0.0
 
@@ -132,13 +134,13 @@ def _kinds(model: mujoco.MjModel, actuator: int) -> tuple[int, int]:
 
 
 def remove_curves(model: mujoco.MjModel, actuator: int) -> None:
-    """Make gain and bias of a muscle actuator constants, which MuJoCo need not compute, and mark it."""
+    """Make gain and bias of a muscle actuator constant, so that MuJoCo need not compute its curves, and mark it."""
     model.actuator_gaintype[actuator], model.actuator_biastype[actuator] = _NO_CURVES
     model.actuator_dynprm[actuator, COLUMN] = 1.0
 
 
 def restore_curves(model: mujoco.MjModel, actuator: int) -> None:
-    """Make gain and bias a muscle's again, and remove the mark."""
+    """Restore the muscle's gain and bias, and remove the mark."""
     model.actuator_gaintype[actuator], model.actuator_biastype[actuator] = _CURVES
     model.actuator_dynprm[actuator, COLUMN] = 0.0
 
@@ -152,13 +154,13 @@ def lacks_stops(model: mujoco.MjModel, tendon: int) -> bool:
 
 
 def remove_stops(model: mujoco.MjModel, tendon: int) -> None:
-    """Take the stops from a tendon whose first one is a site, and mark there how many they were."""
+    """Remove the stops of a tendon whose first stop is a site, and store their number as a mark."""
     model.wrap_prm[model.tendon_adr[tendon]] = model.tendon_num[tendon]
     model.tendon_num[tendon] = 0
 
 
 def restore_stops(model: mujoco.MjModel, tendon: int) -> None:
-    """Give a tendon without stops its own back, and remove the mark."""
+    """Restore the stops of a tendon, and remove the mark."""
     first = int(model.tendon_adr[tendon])
     model.tendon_num[tendon] = int(model.wrap_prm[first])
     model.wrap_prm[first] = 0.0
@@ -174,7 +176,7 @@ def hide_tendon(element: mujoco.MjsTendon) -> None:
 
 
 def show_tendon(element: mujoco.MjsTendon) -> None:
-    """Give a tendon of an MjSpec the width back that `hide_tendon` has taken from it."""
+    """Restore the width of a tendon of an MjSpec that `hide_tendon` has changed."""
     if element.width < HIDDEN_BELOW:
         element.width /= HIDDEN_FACTOR
 
@@ -183,7 +185,7 @@ def show_tendon(element: mujoco.MjsTendon) -> None:
 
 
 def is_own_instance(name: str) -> bool:
-    """Return whether a plugin's instance has the name that mjwrap gives to its own, behind any prefix."""
+    """Return whether the name of a plugin's instance, without a prefix, is that of mjwrap's instances."""
     return name.endswith(PLUGIN_INSTANCE)
 
 

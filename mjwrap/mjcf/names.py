@@ -1,4 +1,4 @@
-"""Names a model's objects, for messages and for columns of tables."""
+"""Names of a model's objects, for messages and for columns of tables."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from mjwrap.mjcf.marks import own_instances
 
 
 def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
-    """Return an object's name, or #id where it has none."""
+    """Return an object's name, or #id if it has none."""
     return mujoco.mj_id2name(model, kind, index) or f"#{index}"
 
 
 def names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> list[str]:
-    """Return the names of the first `count` objects of a kind, which are all where `count` is how many there are."""
+    """Return the names of the first `count` objects of a kind; with their number as `count`, of all."""
     return [name_of(model, kind, i) for i in range(count)]
 
 
 def listed(found: Iterable[str]) -> str:
-    """Return names for a message: separated by commas, "none" where there are none."""
+    """Return names for a message: separated by commas, or "none"."""
     return ", ".join(found) or "none"
 
 
@@ -30,7 +30,7 @@ def has_plugin(model: mujoco.MjModel) -> bool:
 
 
 def qpos_names(model: mujoco.MjModel) -> list[str]:
-    """Return a name for every entry of qpos: its joint's, with a number where the joint has several."""
+    """Return a name for every entry of qpos: its joint's, with a number if the joint has several."""
     return _joint_names(model, model.jnt_qposadr.tolist(), model.nq)
 
 
@@ -47,7 +47,7 @@ def _joint_names(model: mujoco.MjModel, starts: list[int], total: int) -> list[s
 
 
 def act_names(model: mujoco.MjModel) -> list[str]:
-    """Return a name for every entry of act: its actuator's, with a number where the actuator has several."""
+    """Return a name for every entry of act: its actuator's, with a number if the actuator has several."""
     found: list[str] = []
     for i in range(model.nactuator):
         found += _numbered(name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i), int(model.actuator_actnum[i]))

@@ -1,4 +1,4 @@
-"""Parameters of a declared muscle: numerics, found by what their names contain, become a law's dataclass."""
+"""Read the parameters of a declared muscle: numerics, recognised by their names, become a law's dataclass."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from mjwrap.text import counted
 
 OBJ = mujoco.mjtObj
 TIMES, SMOOTHING = "activation_time_constants", "activation_smoothing"
-LAW, TENDON, DYNAMICS = "law", "tendon_model", "activation_dynamics"  # what the names of texts contain
-# Per law: the numerics that it needs and those that it can do without.
+LAW, TENDON, DYNAMICS = "law", "tendon_model", "activation_dynamics"  # words in the names of texts
+# For each law: the numerics that it needs, and optional ones.
 LAWS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     name: (law.needs, law.takes + (TIMES, SMOOTHING) * law.activated) for name, law in laws.LAWS.items()
 }
@@ -55,11 +55,13 @@ def read_numerics(model: mujoco.MjModel, ids: list[int]) -> Given:
 
 
 def read_texts(model: mujoco.MjModel, ids: list[int]) -> dict[str, str]:
-    """Return the contents of texts by what their names contain."""
+    """Return the contents of texts by the word in their names."""
     given: dict[str, str] = {}
     for i in ids:
         name = name_of(model, OBJ.mjOBJ_TEXT, i)
-        key = max(TEXTS, key=lambda key: name.rfind(key))  # the last: the muscle may be called claw
+        key = max(
+            TEXTS, key=lambda key: name.rfind(key)
+        )  # the last one in the name: a muscle may be called claw
         if key not in name:
             raise ModelError(f"text '{name}' must contain one of these in its name: {listed(TEXTS)}")
         if key in given:
@@ -71,7 +73,7 @@ def read_texts(model: mujoco.MjModel, ids: list[int]) -> dict[str, str]:
 
 
 def choose_law(given: Given) -> str:
-    """Return the law whose parameters are given, for a tuple that names none: MuJoCo's where there are none."""
+    """Return the law whose parameters are given, for a tuple that names no law; without parameters MuJoCo's."""
     for law, (needed, _) in LAWS.items():
         if any(key in given for key in needed):
             return law
@@ -83,8 +85,8 @@ def build_law(
 ) -> Law:
     """Return a law's dataclass from the numerics of a tuple, or from its muscle actuator for MuJoCo's own.
 
-    tendon: "rigid" or "elastic", or None where the tuple does not say; only laws with a tendon know it. native: the
-    force of MuJoCo's own is what it computes for the actuator, of any kind.
+    tendon: "rigid" or "elastic", None if the tuple does not say; only for laws with a tendon. native: under MuJoCo's
+    own law the force is that which MuJoCo computes for the actuator, of any kind.
     """
     if law not in LAWS:
         raise ModelError(f"law '{law}' does not exist; laws: {listed(LAWS)}")
@@ -102,15 +104,15 @@ def build_law(
         found = FIBER_LAWS[law](**values) if tendon is None else FIBER_LAWS[law](**values, tendon=tendon)
         if found.states == 2 and actuator >= 0 and not keeps_state(model, actuator):
             raise ModelError(
-                "an elastic tendon needs a fibre length as state, for which its actuator has no place: write it as "
+                "an elastic tendon needs the fibre length as a state, which its actuator does not have: write it as "
                 "<general dyntype='user' actdim='2' .../>, or let mjwrap.set_laws(spec, ...) do that"
             )
         return found
     if tendon is not None:
         raise ModelError(
-            f"law '{law}' has no tendon; {TENDON} ({listed(TENDONS)}) is for {listed(FIBER_LAWS)}"
+            f"law '{law}' has no tendon; {TENDON} ({listed(TENDONS)}) is only for the laws {listed(FIBER_LAWS)}"
         )
-    if law != MuJoCoMuscle.law:  # whose numbers are its actuator's
+    if law != MuJoCoMuscle.law:  # its parameters are those of the actuator
         return laws.LAWS[law](**values)
     if native and actuator >= 0:
         astray = tendon_reason(model, actuator)
@@ -119,7 +121,7 @@ def build_law(
         return ActuatorForce()
     if actuator < 0 or not is_muscle(model, actuator):
         raise ModelError(
-            f"law 'mujoco' needs a muscle actuator in the tuple; laws that do not: {_without('mujoco')}"
+            f"law 'mujoco' needs a muscle actuator in the tuple; laws without an actuator: {_without('mujoco')}"
         )
     reason = curves_reason(model, actuator)
     if reason is not None:
@@ -134,13 +136,13 @@ def _without(law: str) -> str:
 def activation_dynamics(
     model: mujoco.MjModel, actuator: int, given: Given, dynamics: str | None
 ) -> ActivationDynamics:
-    """Return how the activation follows the excitation, where mjwrap integrates it; elsewhere nothing may be given."""
+    """Return the activation dynamics if mjwrap integrates the activation; otherwise none may be given."""
     own = actuator < 0 or keeps_state(model, actuator)
     said = [key for key in (TIMES, SMOOTHING) if key in given] + [DYNAMICS] * (dynamics is not None)
     if said and not own:
         raise ModelError(
-            f"{listed(said)} is for muscles whose activation mjwrap integrates, those without an actuator "
-            f"or with one of dyntype='user' actdim='2'; this one has its actuator's own dynamics"
+            f"{listed(said)} is only for muscles whose activation mjwrap integrates: those without an actuator, or "
+            f"with an actuator of dyntype='user' actdim='2'; this muscle has the dynamics of its actuator"
         )
     if dynamics is not None and dynamics not in FORMS:
         raise ModelError(f"{DYNAMICS} '{dynamics}' do not exist; there are: {listed(FORMS)}")

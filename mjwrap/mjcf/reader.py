@@ -1,4 +1,4 @@
-"""Reads all muscles of a model: those that its tuples declare, and its native muscle actuators."""
+"""Read all muscles of a model: those that its tuples declare, and its native muscle actuators."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
     """Read every muscle that a model declares, in the order of its actuators, then of tuples without an actuator.
 
     transmission: MuJoCo computes the forces of its own muscles (`ActuatorForce`) and of all other actuators on spatial
-    tendons, which then count as muscles too. Raises `ModelError` for a declaration that cannot be understood; native
-    muscle actuators that mjwrap cannot take over, or other actuators whose path it cannot, are left to MuJoCo and
-    named in `native`.
+    tendons, which then count as muscles too. Raises `ModelError` for a wrong declaration. Native muscle actuators, or
+    other actuators, that mjwrap cannot take over stay with MuJoCo and are listed in `native`.
     """
     if not hasattr(model, "nactuator"):
         raise VersionError(f"mjwrap needs MuJoCo 3.11 or newer, this is {mujoco.__version__}")

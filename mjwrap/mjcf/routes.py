@@ -1,4 +1,4 @@
-"""Builds the routes of muscles: a list of stops, from a tendon or a tuple, becomes pieces of string between sites."""
+"""Build the routes of muscles: convert a list of stops, from a tendon or a tuple, to pieces of string between sites."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OBJ = mujoco.mjtObj
 class Stop(NamedTuple):
     """One element of a list of stops: id of a site, geom, hint (a site) or sizes (a numeric), or a pulley's divisor.
 
-    finite: a cylinder geom is wrapped as long as it is drawn, not as an infinite one. inside: the string is held to the
+    finite: a cylinder geom has the length with which it is drawn, not an infinite one. inside: the string must meet the
     geom's solid.
     """
 
@@ -31,7 +31,7 @@ class Stop(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """A site of a route, or a geom with what the elements after it say of it."""
+    """A site of a route, or a geom with the properties that the elements after it give."""
 
     site: int = -1
     geom: int = -1
@@ -44,8 +44,8 @@ class _Place(NamedTuple):
 def tendon_stops(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Stop]:
     """Return the stops of a spatial tendon. poses: any, with kinematics.
 
-    A string is held inside a geom if the side site is inside and stays there, or if one of its ends does: MuJoCo's is
-    straight then, and so is the shortest one that meets the solid.
+    A string is held inside a geom if the side site is inside and stays there, or if one of its ends does: MuJoCo's path
+    is straight then, and so is the shortest one that meets the solid.
     """
     stops: list[Stop] = []
     first = int(model.tendon_adr[tendon])
@@ -69,7 +69,7 @@ def tendon_stops(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> li
 
 
 def geoms_of(stops: list[Stop]) -> list[tuple[int, int, tuple[int, int]]]:
-    """Return of every geom its place among a tendon's stops, its side site or -1, and the sites at its ends."""
+    """Return for every geom its index among a tendon's stops, its side site or -1, and the sites around it."""
     found: list[tuple[int, int, tuple[int, int]]] = []
     for k, stop in enumerate(stops):
         if stop.kind == "geom":
@@ -80,7 +80,7 @@ def geoms_of(stops: list[Stop]) -> list[tuple[int, int, tuple[int, int]]]:
 
 
 def build_routes(model: mujoco.MjModel, muscle: str, stops: Iterable[Stop]) -> tuple[Route, ...]:
-    """Return the routes of a list of stops, one per stretch between pulleys; `ModelError` names what is wrong."""
+    """Return the routes of a list of stops, one per piece between pulleys; `ModelError` for a wrong list."""
     stretches: list[tuple[float, list[Stop]]] = [(1.0, [])]
     for stop in stops:
         if stop.kind != "pulley":
@@ -115,7 +115,7 @@ def _build_route(model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: 
 
 
 def _completed(model: mujoco.MjModel, muscle: str, place: _Place | None, stop: Stop) -> _Place:
-    """Return a geom's place with a hint or sizes added to it."""
+    """Return a geom's place with a hint or sizes added."""
     if place is not None and place.geom >= 0:
         if stop.kind == "hint" and place.hint < 0:
             return place._replace(hint=stop.index)

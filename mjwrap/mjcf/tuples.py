@@ -1,4 +1,4 @@
-"""Reads a muscle from a `<custom>` tuple whose name contains "mjwrap": route, parameters, law and actuator."""
+"""Read a muscle from a `<custom>` tuple whose name contains "mjwrap": route, parameters, law and actuator."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from mjwrap.mjcf.wrapping_geoms import size_keys
 OBJ = mujoco.mjtObj
 MARKS = {
     OBJ.mjOBJ_SITE: ("site", "0 makes it a stop of the path, 1 the hint of the geom before"),
-    OBJ.mjOBJ_GEOM: ("geom", "0 wraps a cylinder of any length, 1 one as long as it is drawn"),
+    OBJ.mjOBJ_GEOM: ("geom", "0 wraps an infinite cylinder, 1 a cylinder as long as it is drawn"),
 }
 
 
 @dataclass
 class _Elements:
-    """The elements of a tuple, by what they say."""
+    """The elements of a tuple, by their meaning."""
 
     actuators: list[int] = field(default_factory=list)
     tendons: list[int] = field(default_factory=list)
@@ -46,9 +46,9 @@ class _Elements:
 def read_tuple(
     model: mujoco.MjModel, rest: mujoco.MjData, index: int, transmission: bool = False
 ) -> MuscleDeclaration:
-    """Return the muscle that a tuple declares; `ModelError` names the tuple or muscle and the element at fault.
+    """Return the muscle that a tuple declares; `ModelError`, which names the tuple or muscle and the element, if wrong.
 
-    rest: kinematics of the reference pose. transmission: for the law "mujoco" MuJoCo itself computes the force, of any
+    rest: kinematics of the reference pose. transmission: under the law "mujoco" MuJoCo computes the force, of any
     actuator on a spatial tendon.
     """
     tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
@@ -69,9 +69,7 @@ def read_tuple(
     stops = found.stops
     if not stops:
         if tendon < 0:
-            raise ModelError(
-                f"tuple '{tuple_name}': it has neither sites of its own nor a tendon to take them from"
-            )
+            raise ModelError(f"tuple '{tuple_name}': it has neither sites nor a tendon with sites")
         stops = tendon_stops(model, rest, tendon)
     routes = build_routes(model, name, stops)
     try:
@@ -145,4 +143,4 @@ def _at_most_one(model: mujoco.MjModel, kind: mujoco.mjtObj, items: list[int]) -
     if len(items) > 1:
         what = kind.name.removeprefix("mjOBJ_").lower()
         there = listed(name_of(model, kind, item) for item in items)
-        raise ModelError(f"at most one {what} makes a muscle, not {len(items)}: {there}")
+        raise ModelError(f"a muscle can have only one {what}, not {len(items)}: {there}")

@@ -1,7 +1,7 @@
-"""Wrapping surfaces of a model: the shape that a geom has, or the one that a numeric beside it declares.
+"""Wrapping surfaces of a model: the shape of a geom, or a shape that a numeric declares.
 
-A numeric whose name contains one of `SIZES` gives the geom before it this shape, with these sizes; the geom's own type
-and size then play no part, only its frame does.
+A numeric whose name contains one of `SIZES` gives the geom before it this shape, with these sizes; of the geom itself
+only the frame is used then, not the type and size.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from mjwrap.text import counted
 GEOM, NUMERIC = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_NUMERIC
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _MESHES = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF)
-STILL = 1e-9  # [m, 1] a mesh frame that is moved by less than this has not been moved
+STILL = 1e-9  # [m, 1] a mesh frame that is moved by less than this counts as not moved
 
-# Per type of geom: the surface of its sizes (3,) [m].
+# For each type of geom: the surface of its sizes (3,) [m].
 GEOMS: dict[int, Callable[[list[float]], Surface]] = {
-    _CYLINDER: lambda size: Cylinder(size[0]),  # of any length, as MuJoCo wraps it
+    _CYLINDER: lambda size: Cylinder(size[0]),  # infinite, as in MuJoCo's wrapping
     int(mujoco.mjtGeom.mjGEOM_SPHERE): lambda size: Sphere(size[0]),
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): lambda size: Ellipsoid((size[0], size[1], size[2])),
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): lambda size: Capsule(size[0], size[1]),
@@ -34,7 +34,7 @@ GEOMS: dict[int, Callable[[list[float]], Surface]] = {
 
 class _Sizes(NamedTuple):
     meaning: str
-    least: int  # fewest values
+    least: int  # smallest number of values
     build: Callable[..., Surface]
 
     @property
@@ -42,7 +42,7 @@ class _Sizes(NamedTuple):
         return len(self.meaning.split())
 
 
-# By what a numeric's name contains: its values [m], in the order of the surface's class.
+# By the word in a numeric's name: its values [m], in the order of the surface's class.
 SIZES: dict[str, _Sizes] = {
     surface.numeric: _Sizes(surface.numeric_sizes, surface.numeric_least, surface.from_numeric)
     for surface in SURFACES
@@ -51,21 +51,21 @@ SIZES: dict[str, _Sizes] = {
 
 
 def size_keys(name: str) -> list[str]:
-    """Return which of `SIZES` a numeric's name contains; not those within another, as in elliptic_cylinder_size."""
+    """Return which of `SIZES` a numeric's name contains, without those that are part of another one in the name."""
     found = [key for key in SIZES if key in name]
     return [key for key in found if not any(key in other for other in found if other != key)]
 
 
 def wrapping_geoms(model: mujoco.MjModel) -> str:
-    """Return the names of all geoms that are wrapping surfaces as they stand, for a message."""
+    """Return the names of all geoms whose type is that of a wrapping surface, for a message."""
     return listed(name_of(model, GEOM, i) for i in range(model.ngeom) if int(model.geom_type[i]) in GEOMS)
 
 
 def read_surface(model: mujoco.MjModel, geom: int, numeric: int = -1, finite: bool = False) -> Surface:
-    """Return the surface of a geom, or the one that a numeric gives its frame.
+    """Return the surface of a geom, or the surface that a numeric declares in its frame.
 
     finite: a cylinder geom's own half length is its range of validity. Raises `ModelError`, which names geom and
-    numeric, for sizes without sense and for frames that are not where the file says.
+    numeric, for invalid sizes and for frames that MuJoCo has moved.
     """
     name, kind = name_of(model, GEOM, geom), int(model.geom_type[geom])
     if finite and (numeric >= 0 or kind != _CYLINDER):
@@ -89,8 +89,8 @@ def _declared(model: mujoco.MjModel, name: str, geom: int, numeric: int) -> Surf
     if kind in _MESHES and _moved(model, int(model.geom_dataid[geom])):
         raise ModelError(
             f"geom '{name}' is a mesh whose frame MuJoCo has moved to its centre of mass and principal axes, so the "
-            f"surface of numeric '{label}' would not stand where the file says; give it a geom of its own, a small "
-            f"sphere for one, at the pose that is meant"
+            f"surface of numeric '{label}' would not be where the file says; give it a geom of its own, such as a "
+            f"small sphere, at the pose of the surface"
         )
     (key,) = size_keys(label)
     sizes, first = SIZES[key], int(model.numeric_adr[numeric])
@@ -108,7 +108,7 @@ def _declared(model: mujoco.MjModel, name: str, geom: int, numeric: int) -> Surf
 
 
 def _moved(model: mujoco.MjModel, mesh: int) -> bool:
-    """Return whether the compiler has given a mesh another frame than that of its file."""
+    """Return whether the compiler has moved the frame of a mesh from that of its file."""
     if mesh < 0:
         return False
     turned = np.abs(model.mesh_quat[mesh]) - (1.0, 0.0, 0.0, 0.0)

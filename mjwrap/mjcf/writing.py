@@ -1,4 +1,4 @@
-"""Muscle laws written into an MjSpec, as the tuples, numerics and texts that `tuples.py` reads."""
+"""Write muscle laws into an MjSpec, as tuples, numerics and texts, which `tuples.py` reads."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def set_laws(
         )
     for name, law in laws.items():
         _check(name, law, actuators.get(name), by_actuator.get(name))
-    held = [
+    holders = [
         a
         for name, law in laws.items()
         if (law.states == 2 or dynamics is not None) and (a := actuators.get(name))
     ]
-    _make_room(spec, held)
+    _insert_fiber_lengths(spec, holders)
     for name, law in laws.items():
         chosen = dynamics
         actuator = actuators.get(name)
@@ -78,14 +78,14 @@ def set_laws(
 
 
 def _check(name: str, law: object, actuator: Any, entry: Any) -> None:
-    """Raise `ModelError` where a muscle cannot have a law."""
+    """Raise `ModelError` if a muscle cannot have a law."""
     if not isinstance(law, FiberLaw):
         kinds = " or ".join(each.__name__ for each in FIBER_LAWS.values())
         raise ModelError(f"muscle '{name}': its law must be {kinds}, not {type(law).__name__}")
     mixed = [key for key in (*NUMERICS, *SIZES) if key in name]
     if mixed:
         raise ModelError(
-            f"muscle '{name}': its name contains '{mixed[0]}', by which a numeric would be recognised"
+            f"muscle '{name}': its name contains '{mixed[0]}', which is the name of a parameter in numerics"
         )
     if actuator is None:
         return
@@ -96,8 +96,8 @@ def _check(name: str, law: object, actuator: Any, entry: Any) -> None:
         raise ModelError(f"muscle '{name}': the gear of its actuator is not positive, so it pushes")
 
 
-def _make_room(spec: mujoco.MjSpec, holders: list[Any]) -> None:
-    """Put a fibre length of 0 behind the activation of actuators in every keyframe that has activations."""
+def _insert_fiber_lengths(spec: mujoco.MjSpec, holders: list[Any]) -> None:
+    """Insert a fibre length of 0 after the activation of actuators in every keyframe that has activations."""
     keys = [key for key in spec.keys if len(key.act)]
     if not keys or not holders:
         return
@@ -131,7 +131,7 @@ def _actuator_of(entry: Any) -> str:
 
 
 def _fresh(name: str, taken: Mapping[str, Any]) -> str:
-    """Return the name, with a number where there is one of that name already."""
+    """Return the name, with a number if the name is taken."""
     found, k = name, 2
     while found in taken:
         found, k = f"{name}_{k}", k + 1
@@ -139,7 +139,7 @@ def _fresh(name: str, taken: Mapping[str, Any]) -> str:
 
 
 def _native_dynamics(actuator: Any) -> ActivationDynamics | None:
-    """Return the time constants of MuJoCo's muscle dynamics; None where the actuator has others."""
+    """Return the time constants of MuJoCo's muscle dynamics; None if the actuator has other dynamics."""
     if actuator.dyntype != mujoco.mjtDyn.mjDYN_MUSCLE:
         return None
     return ActivationDynamics("zajac", float(actuator.dynprm[0]), float(actuator.dynprm[1]))
@@ -154,7 +154,7 @@ def _hold_states(actuator: Any) -> None:
 
 
 def _is_parameter(kind: mujoco.mjtObj, name: str, keep: tuple[str, ...]) -> bool:
-    """Return whether an element says which law a muscle has, rather than where it runs, or what is to be kept."""
+    """Return whether an element belongs to the law of a muscle, and not to its route or to what is kept."""
     if kind not in (OBJ.mjOBJ_NUMERIC, OBJ.mjOBJ_TEXT) or any(key in name for key in keep):
         return False
     return any(key in name for key in (NUMERICS if kind == OBJ.mjOBJ_NUMERIC else TEXTS))
@@ -173,7 +173,7 @@ def _write(
         texts[DYNAMICS] = dynamics.dynamics
     keep = (TIMES, SMOOTHING, DYNAMICS) if dynamics is None else ()
     elements = [e for e in _elements(entry) if not _is_parameter(e[0], e[1], keep)]
-    # what is there is changed in place: MuJoCo 4 deletes a tuple with an element of it
+    # existing elements are changed in place: MuJoCo 4 deletes a tuple together with an element of it
     known_numerics, known_texts = {n.name: n for n in spec.numerics}, {t.name: t for t in spec.texts}
     for key, values in numerics.items():
         name = f"mjwrap_{muscle}_{key}"

@@ -1,1 +1,1 @@
-"""What mjwrap makes of a compiled model: the kernels' arrays, disabled actuators, coupled joints, crossed dofs."""
+"""Prepare a compiled model: the kernels' arrays, disabled actuators, coupled joints, and crossed dofs."""

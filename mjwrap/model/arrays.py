@@ -1,4 +1,4 @@
-"""Builds the flat arrays that the kernels read, once for all muscles of a model, from its declarations."""
+"""Build the flat arrays of the kernels for all muscles of a model from its declarations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Plan:
-    """Muscles, routes and nodes as the kernels in `mjwrap/kernels/coupling/muscle_paths.py` read them."""
+    """Muscles, routes and nodes for the kernels in `mjwrap/kernels/coupling/muscle_paths.py`."""
 
     n: int
     node: Array  # (N, ROW), cold
@@ -32,16 +32,16 @@ class Plan:
     weights: Array  # (C,)
     law: Ints  # (n,)
     params: Array  # (n, PARAMS)
-    source: Ints  # (n,) where the state comes from
+    source: Ints  # (n,) source of the state
     index: Ints  # (n,) in act
     control: Ints  # (n,) in ctrl
     ctrl_low: Array  # (n,)
     ctrl_high: Array  # (n,)
     form: Ints  # (n,) of the activation dynamics
     times: Array  # (n, 5) constants of the activation dynamics
-    integrates: bool  # whether mjwrap integrates a state itself
+    integrates: bool  # whether mjwrap integrates a state
     output: (
-        Ints  # (n,) of the actuator whose length, velocity and moment mjwrap writes; -1 where wrenches act
+        Ints  # (n,) output of the actuator whose length, velocity and moment mjwrap writes; -1: wrenches act
     )
 
     def route_group(self) -> Routes:
@@ -49,7 +49,7 @@ class Plan:
         return Routes(self.routes, self.weights, self.links)
 
     def muscle_group(self, off: NDArray[np.bool_]) -> Muscles:
-        """Return the kernels' group of muscles; off (n,): which are switched off, read at every evaluation."""
+        """Return the kernels' group of muscles; off (n,): which muscles are switched off, read at every evaluation."""
         return Muscles(
             self.law, self.params, self.source, self.index, self.control, self.ctrl_low, self.ctrl_high,
             self.form, self.times, off,
@@ -57,7 +57,7 @@ class Plan:
 
 
 def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, int, int, float, float]:
-    """Return where a muscle's state comes from: source, index in act and in ctrl, limits of the control."""
+    """Return the source of a muscle's state: source, index in act and in ctrl, limits of the control."""
     if declared.actuator < 0:
         direct = declared.parameters.states == 0
         return (dynamics.FROM_EXCITATION if direct else dynamics.STATE_IN_MJWRAP), 0, 0, -np.inf, np.inf
@@ -81,7 +81,7 @@ def _source(model: mujoco.MjModel, declared: MuscleDeclaration) -> tuple[int, in
 
 
 def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int) -> tuple[int, list[float]]:
-    """Return form and constants of a muscle's activation dynamics: mjwrap's, or those of an actuator with actearly."""
+    """Return form and constants of a muscle's activation dynamics: mjwrap's own, or of an actuator with actearly."""
     if source != dynamics.FROM_NEXT_ACT:
         return declared.activation.form, [*declared.activation.row(), 0.0, 0.0]
     actuator = declared.actuator
@@ -93,7 +93,7 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 
 
 def kernel_rows(node: Node) -> list[Array]:
-    """Return the kernels' rows of a stop, cold: one, or several for a surface that a string may touch several times."""
+    """Return the kernels' rows of a stop, for a cold start; several if a string may touch its surface several times."""
     if node.surface is not None:
         return list(surface_rows(node.surface, node.inside))
     row = np.zeros(layout.ROW)

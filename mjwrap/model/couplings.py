@@ -1,8 +1,8 @@
-"""Puts joints that follow others by joint equalities where they belong, and gives their Jacobian N.
+"""Set joints that follow others by joint equalities to their positions, and compute their Jacobian N.
 
-A joint equality of MuJoCo (`<equality><joint polycoef>`) wants its first joint, the follower, at q = qpos0 + Σ cᵢ xⁱ,
-i = 0..4, where x is q − qpos0 of its second joint, the leader, and 0 where there is no leader. In a simulation it is a
-soft constraint; here the follower is put exactly there. Followers may lead others.
+A joint equality of MuJoCo (`<equality><joint polycoef>`) requires q = qpos0 + Σ cᵢ xⁱ of its first joint, the follower,
+i = 0..4, where x is q − qpos0 of its second joint, the leader, or 0 without a leader. In a simulation it is a soft
+constraint; here the follower is set exactly. A follower may be the leader of others.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ def read_couplings(model: mujoco.MjModel) -> list[Coupling]:
 
 
 class CoupledJoints:
-    """All joints of a model that follow others, in an order in which leaders come first.
+    """All joints of a model that follow others, sorted so that leaders come first.
 
-    free: a joint that follows none here although an equality says so, -1 for no such joint. A joint with several
-    equalities follows the first; an equality that would close a ring of followers is left out.
+    free: a joint that counts as independent here although it has an equality, or -1. A joint with several equalities
+    follows the first; an equality that would close a loop of followers is left out.
     """
 
     def __init__(self, model: mujoco.MjModel, free: int = -1) -> None:
@@ -48,24 +48,26 @@ class CoupledJoints:
         self.leader = {joint: coupling.leader for joint, coupling in chosen.items()}  # by follower; -1: none
         self._levels = [_Level(model, level) for level in _by_depth(chosen)]
         followers = np.array(model.jnt_dofadr[list(chosen)], dtype=np.int64)
-        self.independent: Ints = np.setdiff1d(np.arange(model.nv), followers)  # (k,) dofs that follow none
+        self.independent: Ints = np.setdiff1d(
+            np.arange(model.nv), followers
+        )  # (k,) dofs that follow no other
         self._nv = int(model.nv)
 
     def head(self, joint: int) -> int:
-        """Return the joint that a joint follows in the end: itself where it follows none, -1 where it is fixed."""
+        """Return the independent joint that a joint follows: itself if it is independent, -1 if it is fixed."""
         while joint in self.leader:
             joint = self.leader[joint]
         return joint
 
     def place(self, qpos: Array) -> None:
-        """Put the followers in a pose qpos (nq,) where their leaders want them, in place [m or rad]."""
+        """Set the followers in a pose qpos (nq,) to the positions given by their leaders, in place [m or rad]."""
         for level in self._levels:
             qpos[level.qpos_at] = level.rest + level.value(qpos)
 
     def spread(self, qpos: Array, tangent: Array) -> None:
-        """Set the rows of the followers in d(pose)/d(something) (nv,) or (nv, m), in place, from their leaders' rows.
+        """Set the followers' rows of a derivative d(pose)/dx (nv,) or (nv, m), in place, from their leaders' rows.
 
-        qpos (nq,): the pose at which, with the followers in place.
+        qpos (nq,): the pose of the derivative, with the followers in place.
         """
         for level in self._levels:
             slope = level.slope(qpos)
@@ -85,7 +87,7 @@ class CoupledJoints:
 
 
 class _Level:
-    """Couplings whose leaders are all placed before them, as arrays."""
+    """Couplings, as arrays, whose leaders are all set before them."""
 
     def __init__(self, model: mujoco.MjModel, couplings: list[Coupling]) -> None:
         joints = [coupling.joint for coupling in couplings]
@@ -113,7 +115,7 @@ class _Level:
 
 
 def _choose(couplings: list[Coupling]) -> dict[int, Coupling]:
-    """Return the coupling that each follower obeys."""
+    """Return the coupling that determines each follower."""
     chosen: dict[int, Coupling] = {}
     for coupling in couplings:
         head = coupling.leader
@@ -125,7 +127,7 @@ def _choose(couplings: list[Coupling]) -> dict[int, Coupling]:
 
 
 def _by_depth(chosen: dict[int, Coupling]) -> list[list[Coupling]]:
-    """Return couplings in lists, each of which needs only the joints of the lists before it."""
+    """Return couplings in lists, each of which depends only on joints of previous lists."""
 
     def depth(joint: int) -> int:
         return 1 + depth(chosen[joint].leader) if joint in chosen else 0

@@ -1,4 +1,4 @@
-"""Finds which degrees of freedom move which bodies, and which of them a muscle crosses."""
+"""Find the degrees of freedom that move each body, and those that each muscle crosses."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def moving_dofs(model: mujoco.MjModel) -> Bools:
 
 
 def crossed_dofs(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> Bools:
-    """Return which degrees of freedom each muscle crosses (n, nv).
+    """Return the degrees of freedom that each muscle crosses, (n, nv).
 
-    A route crosses those that move some, but not all, of the bodies of its sites and geoms; only these can change its
-    length. A muscle crosses what one of its routes crosses.
+    A route crosses a degree of freedom that moves some, but not all, of the bodies of its sites and geoms; only these
+    can change its length. A muscle crosses those that any of its routes crosses.
     """
     moves = moving_dofs(model)
     crossed = np.zeros((len(muscles), model.nv), dtype=np.bool_)

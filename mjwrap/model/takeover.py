@@ -1,8 +1,8 @@
-"""Disables native actuators whose muscles mjwrap pulls, and gives them back.
+"""Disable the native actuators whose muscles mjwrap drives, and enable them again.
 
-A disabled actuator keeps control, activation dynamics, gain and bias; its force is clamped to zero through
-`actuator_forcerange`, which MuJoCo reads at every step. The limits that it had stand in the model itself
-(`mjwrap/mjcf/marks.py`): so a copy of such a model knows them too.
+A disabled actuator keeps control, activation dynamics, gain and bias; its force is limited to zero by
+`actuator_forcerange`, which MuJoCo reads at every step. Its original limits are stored in the model itself
+(`mjwrap/mjcf/marks.py`), so that a copy of the model has them too.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import mujoco
 
 from mjwrap.mjcf import marks
 
-_RELEASES: dict[int, int] = {}  # how often each living model was released, by its id
+_RELEASES: dict[int, int] = {}  # number of releases of each existing model, by its id
 
 
 class Takeover:
-    """The disabled actuators of one model, whoever disabled them."""
+    """The disabled actuators of one model, also those that another takeover has disabled."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
@@ -29,18 +29,18 @@ class Takeover:
         self._limits = marks.disabled_actuators(model)
 
     def disable(self, actuators: list[int]) -> None:
-        """Clamp the actuators' forces to zero, and keep their limits unless they are disabled already."""
+        """Limit the actuators' forces to zero; store their limits, unless they are already disabled."""
         for actuator in actuators:
             if actuator not in self._limits:
                 self._limits[actuator] = marks.force_limits(self._model, actuator)
             marks.disable_force(self._model, actuator, self._limits[actuator])
 
     def was_released(self) -> bool:
-        """Return whether the model was released, by this or another takeover, since this one began."""
+        """Return whether the model was released, by this or another takeover, since this one was made."""
         return _RELEASES[id(self._model)] != self._seen
 
     def release(self) -> None:
-        """Give the actuators that are disabled still their original limits back."""
+        """Restore the original limits of the actuators that are still disabled."""
         for actuator, limits in self._limits.items():
             if marks.is_disabled(self._model, actuator):
                 marks.enable_force(self._model, actuator, limits)
@@ -49,7 +49,7 @@ class Takeover:
 
     @contextmanager
     def original_limits(self) -> Iterator[None]:
-        """Show the original limits for the length of a with block, so that declarations are read as written."""
+        """Restore the original limits inside a with block, so that declarations can be read."""
         for actuator, limits in self._limits.items():
             marks.enable_force(self._model, actuator, limits)
         try:

@@ -1,4 +1,4 @@
-"""Muscles: force laws and their parameters, activation dynamics, energetics, and one muscle on the bench."""
+"""Muscles: force laws and their parameters, activation dynamics, energetics, and the simulation of a single muscle."""
 
 from mjwrap.muscles.activation import ActivationDynamics
 from mjwrap.muscles.laws import (

@@ -1,4 +1,4 @@
-"""Constants of the activation dynamics; the rates are in `mjwrap/kernels/musculotendon/activation_dynamics.py`."""
+"""Parameters of the activation dynamics; the rates are in `mjwrap/kernels/musculotendon/activation_dynamics.py`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TIMES = {"zajac": (0.010, 0.040), "degroote_fregly_2016": (0.015, 0.060)}  # [s]
 
 @dataclass(frozen=True)
 class ActivationDynamics:
-    """First-order dynamics from excitation to activation, both clamped to [0, 1].
+    """First-order dynamics from excitation to activation, both limited to [0, 1].
 
     Args:
         dynamics: "zajac", MuJoCo's and OpenSim's form with two rates (doi 10.1115/1.4023390), or
@@ -23,7 +23,7 @@ class ActivationDynamics:
             latter.
         deactivation_time: time constant of deactivation [s], positive; None for 0.040 with the former and 0.060 with
             the latter.
-        smoothing: b of the latter, positive; larger is sharper.
+        smoothing: b of the latter, positive; a larger value is less smooth.
 
     Raises:
         ModelError: a value is not possible.
@@ -54,7 +54,7 @@ class ActivationDynamics:
         return FORMS[self.dynamics]
 
     def row(self) -> tuple[float, float, float]:
-        """Return time constants [s] and smoothness as the kernels read them."""
+        """Return time constants [s] and smoothing in the order of the kernels."""
         up, down = TIMES[self.dynamics]
         return (
             up if self.activation_time is None else self.activation_time,

@@ -1,4 +1,4 @@
-"""One muscle alone, along a prescribed length: what a physiologist does to it on the bench."""
+"""Simulate a single muscle along a prescribed length, as in an experiment on an isolated muscle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MuscleTrial:
-    """A muscle's history, as arrays (T,).
+    """The history of a single muscle, as arrays (T,).
 
     Attributes:
         time: [s].
@@ -26,7 +26,7 @@ class MuscleTrial:
         activation: activation, 0 to 1.
         fiber_length: [m].
         tension: [N].
-        iterations: evaluations of the balance of fibre and tendon; 0 with a rigid tendon.
+        iterations: evaluations of the equilibrium of fibre and tendon; 0 with a rigid tendon.
         status: codes of `mjwrap/kernels/musculotendon/fiber.py`: 0 normal, 1 at the minimum fibre length, 2 slack
             tendon, 3 not converged.
     """
@@ -60,7 +60,7 @@ def simulate_muscle(
         law: the muscle.
         time: (T,) increasing times [s].
         length: (T,) or one number, musculotendon length [m].
-        excitation: (T,) or one number, held from each time to the next.
+        excitation: (T,) or one number, constant from each time to the next.
         activation: (T,) or one number.
         velocity: (T,) lengthening speed [m/s]; None for central differences of the length.
         initial_activation: at the first time, with `excitation`.
@@ -71,13 +71,13 @@ def simulate_muscle(
         Tension, fibre length and activation at every time.
 
     Raises:
-        StateError: arrays do not fit, or numbers are not finite or not in their range.
+        StateError: an array has a wrong shape, or a number is not finite or not in its range.
     """
     t = np.array(time, dtype=np.float64)
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
         raise StateError("time must be a list of finite, increasing numbers [s]")
     if (excitation is None) == (activation is None):
-        raise StateError("give either an excitation or an activation")
+        raise StateError("give either an excitation or an activation, not both")
     lengths = _column("length", length, t.size)
     if not (lengths > 0.0).all():
         raise StateError("length must be positive [m]")

@@ -1,4 +1,4 @@
-"""Energy of muscles: powers of fibres and tendons, what their springs hold, and what the work costs in metabolism.
+"""Energy of muscles: power of fibres and tendons, stored energy, and metabolic cost.
 
 The equations are in `mjwrap/kernels/musculotendon/power.py` and `mjwrap/kernels/musculotendon/umberger.py`.
 """
@@ -35,13 +35,12 @@ class Umberger2010:
         mass: [kg]; None to compute it.
         aerobic_factor: 1.5 for primarily aerobic activities, 1.0 for others.
         minimum_heat_rate: [W/kg]; 0 for none.
-        effort: scales excitation, activation and active force, for models whose muscles work against each other more
-            than a person's do.
+        effort: factor of excitation, activation and active force, for models with more co-contraction than a person.
         recruitment: slow-twitch fibres are recruited first, and the ratio holds at full excitation (Bhargava et al.
             2004, doi 10.1016/S0021-9290(03)00239-2).
         negative_work: lengthening counts as negative work and gives more heat (Umberger et al. 2003,
             doi 10.1080/1025584031000091678).
-        forbid_negative_power: add heat where the metabolic power would be negative.
+        forbid_negative_power: add heat if the metabolic power would be negative.
 
     Raises:
         ModelError: a number is not finite or not in its range.
@@ -92,10 +91,10 @@ class Umberger2010:
 
 @dataclass(frozen=True, eq=False)
 class Energetics:
-    """Energies and powers of n muscles at one instant, as arrays (n,); power is positive where it is delivered.
+    """Energies and powers of n muscles at one instant, as arrays (n,); power is positive if it is delivered.
 
-    A fibre or tendon that shortens under tension delivers power; one that is stretched takes it up. Muscles without
-    fibres (MuJoCo's, the path actuator) have `muscle_power` only, the rest is zero. `tendon_power` and `tendon_energy`
+    A fibre or tendon that shortens under tension delivers power; one that is stretched absorbs it. Muscles without
+    fibres (MuJoCo's, the path actuator) have only `muscle_power`; the rest is zero. `tendon_power` and `tendon_energy`
     are zero with a rigid tendon. Heats, work and `metabolic_power` are zero without an `Umberger2010`.
 
     Attributes:
@@ -114,7 +113,7 @@ class Energetics:
         activation_heat: [W]; with maintenance_heat the heat of a muscle that is active at constant length.
         maintenance_heat: [W].
         shortening_heat: heat of shortening or lengthening [W], including what `forbid_negative_power` adds.
-        resting_heat: what raises the three heats to `minimum_heat_rate` [W].
+        resting_heat: heat that raises the sum of the three heats to `minimum_heat_rate` [W].
         mechanical_work: the part of active_power that the metabolic model counts [W].
         metabolic_power: sum of the four heats and the work [W], without the basal rate of the body (`basal_power`).
     """
@@ -143,7 +142,7 @@ def metabolic_constants(
     """Return the metabolic constants of n muscles.
 
     Args:
-        model: one metabolic model for all muscles, one for each, or None for no metabolism.
+        model: one metabolic model for all muscles, one for each muscle, or None for no metabolic cost.
         law: (n,) codes of the laws, as in the kernels.
         params: (n, PARAMS) parameters of the muscles, as in the kernels.
 
@@ -151,12 +150,12 @@ def metabolic_constants(
         The constants (n, 8).
 
     Raises:
-        ModelError: the number of models is not that of the muscles.
+        ModelError: the numbers of models and muscles differ.
     """
     models = [model] * len(law) if model is None or isinstance(model, Umberger2010) else list(model)
     if len(models) != len(law):
         raise ModelError(
-            f"{len(models)} metabolic models were given for {len(law)} muscles: give one, or one each"
+            f"{len(models)} metabolic models were given for {len(law)} muscles: give one for all, or one for each"
         )
     constants = np.zeros((len(law), umberger.CONSTANTS))
     for m, each in enumerate(models):
@@ -184,7 +183,7 @@ def compute_energetics(
         excitation: (n,) 0 to 1.
         length: (n,) musculotendon lengths [m].
         velocity: (n,) lengthening speeds [m/s].
-        fiber_length: (n,) [m], used with an elastic tendon only.
+        fiber_length: (n,) [m], used only with an elastic tendon.
         constants: (n, 8) from `metabolic_constants`.
 
     Returns:
@@ -201,7 +200,7 @@ def basal_power(body_mass: float, coefficient: float = 1.2, exponent: float = 1.
     Args:
         body_mass: [kg].
         coefficient: [W/kg] if the exponent is 1; 1.2 is for standing (Umberger et al. 2003).
-        exponent: of the mass.
+        exponent: exponent of the mass.
 
     Returns:
         The power [W].

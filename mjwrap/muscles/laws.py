@@ -1,7 +1,7 @@
 """Musculotendon parameters: one frozen, validated dataclass per law, and the list of laws.
 
-A law fills one row of the kernels' parameter table; the kernels' side is `mjwrap/kernels/musculotendon/dispatch.py`.
-How to add one: docs/adding_laws.md.
+A law gives one row of the kernels' parameter table (`mjwrap/kernels/musculotendon/dispatch.py`). docs/adding_laws.md
+explains how to add a law.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from mjwrap.kernels.musculotendon.mujoco_muscle import MINVAL
 
 TENDONS = ("rigid", "elastic")
 # Below this [l_o] an elastic tendon is rigid: at maximum isometric force it would stretch by 5e-6 l_o, which changes
-# a fibre's force by about 1e-5 of that, while its stiffness grows without bound.
+# a fibre's force by about 1e-5 of that, while its stiffness becomes arbitrarily large.
 SHORTEST_TENDON = 1e-4
 LEAST_COSINE = 0.1  # of the pennation angle, at the shortest fibre length (Millard et al. 2013)
 
 
 class Law(Protocol):
-    """What the solver needs of a muscle law: its code, its name, what MJCF may give it, and its row of parameters."""
+    """The interface of a muscle law: its code, its name, its numerics in MJCF, and its row of parameters."""
 
     code: ClassVar[int]
     law: ClassVar[str]
-    needs: ClassVar[tuple[str, ...]]  # keyword arguments that a numeric has to give
-    takes: ClassVar[tuple[str, ...]]  # those that one may give
-    activated: ClassVar[bool]  # whether an activation follows the excitation; else that is the activation
+    needs: ClassVar[tuple[str, ...]]  # arguments that a numeric must give
+    takes: ClassVar[tuple[str, ...]]  # arguments that a numeric may give
+    activated: ClassVar[bool]  # whether it has activation dynamics; else the excitation is the activation
 
     @property
     def states(self) -> int:
-        """Return how many states the law has of activation and fibre length, in this order: 0, 1 or 2."""
+        """Return the number of states, of activation and fibre length in this order: 0, 1 or 2."""
         ...
 
     @property
     def strength(self) -> float:
-        """Return the tension [N] that it has fully active, at rest and at its best length, without the passive part."""
+        """Return the active tension [N] at full activation, constant length and optimal fibre length."""
         ...
 
     def row(self) -> tuple[float, ...]:
-        """Return the parameters in the order of the kernel's section."""
+        """Return the parameters in the order of the kernel."""
         ...
 
 
@@ -58,22 +58,9 @@ def _positive(law: Law, **values: float) -> None:
 
 @dataclass(frozen=True)
 class FiberLaw:
-    """What laws with a fibre and a tendon share: sizes, checks, and the row of parameters.
+    """The common base of laws with a fibre and a tendon: parameters, checks, and the row for the kernels.
 
-    A law adds its code, its name in MJCF and its shortest fibre.
-
-    Args:
-        max_isometric_force: [N], positive.
-        optimal_fiber_length: [m], positive.
-        tendon_slack_length: [m], not negative.
-        pennation_angle: at optimal fibre length [rad], in [0, pi/2).
-        max_contraction_velocity: [optimal fibre lengths/s].
-        fiber_damping: not negative [max isometric forces per max contraction velocity]; None for 0 with a rigid tendon
-            and 0.1 with an elastic one, whose fibre then has one velocity at every activation.
-        tendon: "rigid" or "elastic". A tendon shorter than 1e-4 optimal fibre lengths is always rigid.
-
-    Raises:
-        ModelError: a value is not possible.
+    The parameters are described at `DeGrooteFregly2016`. A law adds its code, its name in MJCF and its shortest fibre.
     """
 
     max_isometric_force: float
@@ -85,7 +72,7 @@ class FiberLaw:
     tendon: str = "rigid"
     code: ClassVar[int]
     law: ClassVar[str]
-    least: ClassVar[float]  # shortest fibre of the law's curves [l_o]
+    least: ClassVar[float]  # length of the shortest fibre of the law's curves [l_o]
     needs: ClassVar[tuple[str, ...]] = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length")
     takes: ClassVar[tuple[str, ...]] = ("pennation_angle", "max_contraction_velocity", "fiber_damping")
     activated: ClassVar[bool] = True
@@ -106,14 +93,14 @@ class FiberLaw:
 
     @property
     def damping(self) -> float:
-        """Return the fibre damping in use, given or by default."""
+        """Return the fibre damping: the given one, or the default."""
         if self.fiber_damping is not None:
             return self.fiber_damping
         return 0.1 if self.tendon == "elastic" else 0.0
 
     @property
     def elastic(self) -> bool:
-        """Return whether the tendon is elastic: asked for, and long enough."""
+        """Return whether the tendon is elastic: requested, and not too short."""
         long = self.tendon_slack_length >= SHORTEST_TENDON * self.optimal_fiber_length
         return self.tendon == "elastic" and long
 
@@ -154,7 +141,7 @@ class DeGrooteFregly2016(FiberLaw):
         pennation_angle: at optimal fibre length [rad], in [0, pi/2).
         max_contraction_velocity: [optimal fibre lengths/s].
         fiber_damping: not negative [max isometric forces per max contraction velocity]; None for 0 with a rigid tendon
-            and 0.1 with an elastic one, whose fibre then has one velocity at every activation.
+            and 0.1 with an elastic one, so that the fibre's velocity is unique at every activation.
         tendon: "rigid" or "elastic". A tendon shorter than 1e-4 optimal fibre lengths is always rigid.
 
     Raises:
@@ -196,15 +183,15 @@ _PRM = ("range[0]", "range[1]", "force", "scale", "lmin", "lmax", "vmax", "fpmax
 
 @dataclass(frozen=True)
 class MuJoCoMuscle:
-    """MuJoCo's own `<muscle>` curves, so that a native model can be compared like for like.
+    """The curves of MuJoCo's own `<muscle>`, for comparisons with a native model.
 
     Args:
         prm: (9,) range (2), force [N], scale, lmin, lmax, vmax, fpmax, fvmax, as in `actuator_gainprm`.
-        length_range: (2,) of the actuator [m times gear].
+        length_range: (2,) length range of the actuator [m times gear].
         acc0: as in `actuator_acc0`.
         gear: as in `actuator_gear`.
         force_range: (2,) [N].
-        passive: (9,) the parameters of the passive force, as in `actuator_biasprm`, if it has its own.
+        passive: (9,) parameters of the passive force, as in `actuator_biasprm`; None if they are those of `prm`.
 
     Raises:
         ModelError: the curves are undefined.
@@ -259,7 +246,7 @@ class MuJoCoMuscle:
 
 @dataclass(frozen=True)
 class ActuatorForce:
-    """The force that MuJoCo computes for an actuator of any kind, whose path is mjwrap's; no tension here."""
+    """The force that MuJoCo computes for an actuator of any kind along mjwrap's path; mjwrap computes no tension."""
 
     code: ClassVar[int] = dispatch.PATH_ACTUATOR
     law: ClassVar[str] = "mujoco"
@@ -269,12 +256,12 @@ class ActuatorForce:
 
     @property
     def states(self) -> int:
-        """Return 0: its states are MuJoCo's."""
+        """Return 0: MuJoCo keeps its states."""
         return 0
 
     @property
     def strength(self) -> float:
-        """Return infinity: only MuJoCo knows how hard its actuator pulls."""
+        """Return infinity: the largest force is not known to mjwrap."""
         return math.inf
 
     def row(self) -> tuple[float, ...]:
@@ -314,16 +301,16 @@ class PathActuator:
         return (self.optimal_force,)
 
 
-# Every law that a declaration can name. MJCF, `set_laws` and tests take their lists from here; where a declaration
-# names none, the first one whose needed numerics are given is meant.
+# Every law that a declaration can name, used by MJCF, `set_laws` and tests. If a declaration names no law, it has the
+# first one whose required numerics are given.
 LAWS: dict[str, type[Law]] = {
     law.law: law for law in (DeGrooteFregly2016, Millard2012, MuJoCoMuscle, PathActuator)
 }
 
 
 def parameter_row(law: Law) -> tuple[float, ...]:
-    """Return a law's parameters, padded to the kernels' columns; `ModelError` for a code that they do not know."""
+    """Return a law's parameters, padded to the kernels' columns; `ModelError` for an unknown code."""
     if not dispatch.is_law_code(law.code):
-        raise ModelError(f"{law.law}: the kernels know no law of code {law.code!r}")
+        raise ModelError(f"{law.law}: the kernels have no law of code {law.code!r}")
     row = law.row()
     return (*row, *[0.0] * (dispatch.PARAMS - len(row)))

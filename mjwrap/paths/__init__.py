@@ -1,4 +1,4 @@
-"""Paths in space without MuJoCo: obstacles with world poses in, a certified geodesic path out.
+"""Paths in space without MuJoCo: from obstacles with world poses to a certified geodesic path.
 
 Everything is in SI units and world coordinates unless it says otherwise.
 """

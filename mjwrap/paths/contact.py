@@ -1,4 +1,4 @@
-"""A contact of a solved path with one obstacle."""
+"""The contact of a solved path with one obstacle."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from mjwrap.paths.scene import Array
 
 @dataclass(frozen=True)
 class Contact:
-    """Where a path touches one obstacle.
+    """The contact of a path with one obstacle.
 
     Attributes:
         active: whether the path touches it. A via point is always active, with P = Q.
         P: (3,) first contact point, world [m]; None if not active.
         Q: (3,) last contact point, world [m]; None if not active.
         arc_length: length of the geodesic from P to Q [m].
-        second: where the path touches the same surface again, behind a hollow that it bridges (through the air over
-            the hole of a torus); None if it does not.
+        second: second contact with the same surface, after a hollow that the path bridges (such as the hole of a
+            torus); None if there is none.
     """
 
     active: bool

@@ -2,7 +2,7 @@
 
 Poses move by twists (n + 2, 6), one per slot: origin, every obstacle and via point, insertion; velocity (or small
 translation) of the pose's origin, then angular velocity (or small rotation vector), world frame. Turning the origin,
-the insertion or a via point changes nothing.
+the insertion or a via point has no effect.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from mjwrap.paths.scene import Array, Point, vector
 from mjwrap.paths.status import Status
 
 FAULTS = {
-    hessian.VANISHING: "the straight segment that leaves {0} has no length, so its direction has no derivative",
+    hessian.VANISHING: "the straight segment that leaves {0} has zero length, so its direction has no derivative",
     hessian.MARGINAL: "its contact with {0} could slip sideways without a change of length",
-    hessian.FLAT: "the surface of {0} is flat along the path where it touches, so the contact has no one place",
+    hessian.FLAT: "the surface of {0} is flat along the path at the contact, so the contact point is not unique",
 }
 
 
 @dataclass(frozen=True)
 class ContactVelocity:
-    """How fast a `Contact` moves; its fields are the rates of the contact's fields.
+    """The velocity of a `Contact`; its fields are the rates of the contact's fields.
 
     Attributes:
         active: whether the obstacle is touched.
         P: (3,) velocity of the first contact point, world [m/s]; None if not active. It is the sum of the obstacle's
             motion and of sliding on the obstacle.
-        Q: (3,) velocity of the last contact point, likewise.
+        Q: (3,) velocity of the last contact point, in the same way.
         arc_length: rate of the arc length [m/s].
         second: rates of the second touch of the same surface.
     """
@@ -47,10 +47,10 @@ class ContactVelocity:
 
 
 class Derivatives:
-    """What `PathSolution` knows about its neighbours, by the implicit function theorem; no solve is repeated.
+    """Derivatives of a `PathSolution` by the implicit function theorem, without another solve.
 
-    All of it is exact to the order of the tangency error. Raises `PathError` where the path was not found, and
-    `GeometryError` where the derivative does not exist.
+    Their error is of the order of the tangency error. Raises `PathError` if the path was not found, and `GeometryError`
+    if the derivative does not exist.
     """
 
     status: Status
@@ -64,7 +64,7 @@ class Derivatives:
     def _twists(
         self, origin_velocity: ArrayLike, insertion_velocity: ArrayLike, twists: ArrayLike | None
     ) -> Array:
-        """Return the twists (n + 2, 6) of all slots, checked; those of the nodes zero where None."""
+        """Return the checked twists (n + 2, 6) of all slots; zeros for the obstacles if `twists` is None."""
         n = len(self.contacts)
         twist = np.zeros((n + 2, 6))
         twist[0, :3] = vector(origin_velocity, 3, "origin_velocity")
@@ -80,7 +80,7 @@ class Derivatives:
         return twist
 
     def _slot(self, slot: int) -> str:
-        """Return what a slot is called."""
+        """Return the name of a slot."""
         if slot == 0:
             return "the origin"
         if slot > len(self.contacts):
@@ -93,7 +93,7 @@ class Derivatives:
             raise GeometryError(f"the path has no {what} here: {FAULTS[fault].format(self._slot(slot))}")
 
     def _path_points(self, what: str, strict: bool = True) -> tuple[int, Array]:
-        """Return the number of path points and their rows; raise where there is no path or, if strict, for a fault."""
+        """Return the number of path points and their rows; raises if there is no path or, if strict, for a fault."""
         if self.status != Status.CONVERGED:
             raise PathError(f"the path has no {what}: {self.status.message}")
         points = np.empty((len(self._node) + 2, hessian.POINT_ROW))
@@ -106,7 +106,7 @@ class Derivatives:
         """Return ∂l/∂x (n + 2, 6): force [-], then moment about the pose's origin [m], of every slot, world frame.
 
         Its product with twists is l̇. Tension F pulls with -F times this; `wrenches` has moments about the world
-        origin. Exists, with the geodesic's direction, where a segment vanishes on a surface.
+        origin. If a segment vanishes on a surface, the direction is that of the geodesic.
         """
         count, points = self._path_points("gradient", strict=False)
         out = np.zeros((len(self.contacts) + 2, 6))
@@ -116,11 +116,11 @@ class Derivatives:
     def stiffness(self) -> Array:
         """Return ∂²l/∂x² (6 (n + 2), 6 (n + 2)), symmetric: the stiffness of the path under unit tension.
 
-        x: of every slot the translation of the pose's origin [m], then the rotation vector [rad] that turns it from
-        where it is, world axes, in the order of `gradient().ravel()`; rows and columns of what is not touched are zero.
-        The rate of the gradient itself along twists d is `stiffness() @ d` less m × ω / 2 in every moment, m the moment
-        in `gradient()` and ω the angular velocity: turns do not commute, so that rate is not symmetric. `GeometryError`
-        where a segment has no length (an end point on a surface) or a contact is about to slip.
+        x: for every slot the translation of the pose's origin [m], then the rotation vector [rad] of its turn, world
+        axes, in the order of `gradient().ravel()`; rows and columns of untouched obstacles are zero. The rate of the
+        gradient along twists d is `stiffness() @ d` minus m × ω / 2 in every moment, with the moment m of `gradient()`
+        and the angular velocity ω: rotations do not commute, so this rate is not symmetric. Raises `GeometryError` if a
+        segment has zero length (an end point on a surface) or a contact is about to slip.
         """
         count, points = self._path_points("stiffness")
         slots = len(self.contacts) + 2
@@ -129,9 +129,9 @@ class Derivatives:
         return matrix
 
     def stiffness_times(self, direction: ArrayLike) -> Array:
-        """Return `stiffness()` times a direction (n + 2, 6) as (n + 2, 6), at a cost that grows with n, not its square.
+        """Return `stiffness()` times a direction (n + 2, 6) as (n + 2, 6); its cost is proportional to n, not to n².
 
-        `GeometryError` as for `stiffness`, and for a direction of another shape or not finite.
+        Raises `GeometryError` as `stiffness` does, and for a direction with a wrong shape or that is not finite.
         """
         count, points = self._path_points("stiffness")
         given = np.array(direction, dtype=np.float64)
@@ -147,8 +147,8 @@ class Derivatives:
     ) -> list[ContactVelocity]:
         """Return one `ContactVelocity` per obstacle, for the motion of `speed`'s arguments.
 
-        At touchdown (arc length zero) it is that of the path that touches. `GeometryError` as for `stiffness`, and
-        where the surface is flat along the path, so that a contact may lie anywhere.
+        At touchdown (arc length zero) it is the velocity of the touching path. Raises `GeometryError` as `stiffness`
+        does, and if the surface is flat along the path, because the contact point is not unique there.
         """
         count, points = self._path_points("contact velocities")
         twist = self._twists(origin_velocity, insertion_velocity, twists)

@@ -46,7 +46,7 @@ class Obstacle:
         quat: (4,) orientation of its frame, w, x, y, z, of any length except zero.
         hint: (3,) a point in the surface's frame [m] near which the path should touch at a cold start; None for no
             hint.
-        inside: hold the path to the solid instead of keeping it out: it is the shortest path that meets the solid,
+        inside: the path must meet the solid and is not kept out of it: it is the shortest path that meets the solid,
             with a corner at one point if the straight line does not meet it. Only for a sphere or a cylinder of any
             length, between end points and via points.
 
@@ -71,13 +71,13 @@ class Obstacle:
             object.__setattr__(self, "hint", vector(self.hint, 3, "Obstacle: hint"))
         if self.inside and not (self.surface.held_about and math.isinf(self.surface.z_limit)):
             raise GeometryError(
-                f"Obstacle: only a Sphere or a Cylinder without ends can have inside=True, not {self.surface!r}"
+                f"Obstacle: only a Sphere or an infinite Cylinder can have inside=True, not {self.surface!r}"
             )
 
 
 @dataclass(frozen=True)
 class ViaPoint:
-    """A point that the path runs through; it may stand anywhere among the obstacles.
+    """A point through which the path runs; it may be anywhere among the obstacles.
 
     pos (3,): world coordinates [m], finite, else `GeometryError`.
     """
@@ -89,7 +89,7 @@ class ViaPoint:
 
 
 def owners(obstacles: Sequence[Obstacle | ViaPoint]) -> NDArray[np.int64]:
-    """Return for every row of the kernels which obstacle it belongs to: a surface with hollows has several."""
+    """Return the obstacle of every row of the kernels; a surface with hollows has several rows."""
     found: list[int] = []
     for k, obstacle in enumerate(obstacles):
         found += [k] * (obstacle.surface.touches if isinstance(obstacle, Obstacle) else 1)
@@ -97,7 +97,7 @@ def owners(obstacles: Sequence[Obstacle | ViaPoint]) -> NDArray[np.int64]:
 
 
 def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
-    """Return the kernels' rows for a list of obstacles, cold; several for a surface with hollows."""
+    """Return the kernels' rows for a list of obstacles, for a cold start; several for a surface with hollows."""
     for k, obstacle in enumerate(obstacles):
         if not isinstance(obstacle, Obstacle | ViaPoint):
             raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")
@@ -108,8 +108,8 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
             and (obstacle.inside or after.inside)
         ):
             raise GeometryError(
-                f"obstacles[{k}] and obstacles[{k + 1}]: an obstacle with inside=True must stand between end points or "
-                f"via points"
+                f"obstacles[{k}] and obstacles[{k + 1}]: the neighbours of an obstacle with inside=True must be end "
+                f"points or via points"
             )
     node = np.zeros((len(owners(obstacles)), layout.ROW))
     first = 0

@@ -1,4 +1,4 @@
-"""The result of a single solve: length and contacts, and on demand points, speed and wrenches."""
+"""The result of a single solve: length and contacts, and methods for points, speed and wrenches."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 
 
 class PathSolution(Derivatives):
-    """The result of `solve_path`: length and contacts, and on demand points, speed and wrenches.
+    """The result of `solve_path`: length and contacts, and methods for points, speed and wrenches.
 
     If no path was found, the length is that of the last iterate, never NaN.
 
@@ -36,7 +36,7 @@ class PathSolution(Derivatives):
     """
 
     def __init__(self, origin: Point, insertion: Point, node: Array, owner: Ints, saved: Array) -> None:
-        self._owner = owner  # (rows,) which obstacle each row of `node` belongs to
+        self._owner = owner  # (rows,) the obstacle of each row of `node`
         self._origin, self._insertion, self._node, self._saved = origin, insertion, node, saved
         self._ends = (0, len(node), *origin, *insertion)
         self.length = 0.0
@@ -57,7 +57,7 @@ class PathSolution(Derivatives):
         known = end_inside.has_valid_length(self.status, self.tangency_error)
         self._saved = self._node[:, SAVED].copy() if known else saved_before.copy()
         if self.status == Status.ENDPOINT_INSIDE and not known:
-            self._saved[:, 0] = layout.COLD  # where a string comes out again is anybody's guess
+            self._saved[:, 0] = layout.COLD  # the last contact point is unknown
         stands_in = known and not self.converged
         list_them = end_inside.list_pulling_segments if stands_in else segments.list_segments
         self._count = list_them(*self._ends, self._node, self._segments, 0)
@@ -88,12 +88,12 @@ class PathSolution(Derivatives):
 
     @property
     def branch(self) -> Array:
-        """What a warm start keeps of this path, a copy, (rows, 11), one row per obstacle, two for one with hollows.
+        """The data of a warm start from this path, a copy: (rows, 11), one row per obstacle, two for one with hollows.
 
-        Columns: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc length [m] and lengths of
-        the straight segments before P and after Q (2) [m], in the surface's frame; beside a free surface that has no
-        closed form, the ends of the straight segment stand in the place of P and t. `solve_path(start=branch)` with the
-        same pose gives the same bits whatever was solved in between.
+        Columns, in the surface's frame: mode (-1 cold, 0 free, 1 touched), swept angle [rad], P (3) [m], t (3), arc
+        length [m], and lengths of the straight segments before P and after Q (2) [m]. For a free surface without a
+        closed form, the ends of the straight segment take the place of P and t. `solve_path(start=branch)` at the same
+        pose gives exactly the same result, whatever was solved in between.
         """
         return self._saved.copy()
 
@@ -107,7 +107,7 @@ class PathSolution(Derivatives):
     def points(self, spacing: float | None = None) -> Array:
         """Return points along the path, (m, 3), world [m], at most `spacing` [m] apart.
 
-        Without a spacing, straight segments have their end points only and geodesics a point every 0.1 rad of turning.
+        Without a spacing, straight segments have only their end points, and geodesics a point every 0.1 rad of turning.
         """
         step = 0.0 if spacing is None else validation.positive(spacing, "spacing", GeometryError, "m")
         count = polyline.polyline(*self._ends, self._node, step, np.empty((0, 3)), 0)
@@ -136,7 +136,7 @@ class PathSolution(Derivatives):
         return float(segments.lengthening_rate(self._count, self._segments, pos, twist))
 
     def wrenches(self, tension: float) -> Array:
-        """Return what the path under `tension` [N] does to origin, each obstacle and insertion.
+        """Return the wrenches of the path under `tension` [N] on origin, each obstacle and insertion.
 
         (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
         is -tension l̇ ("Velocity and force" in docs/derivation.md).

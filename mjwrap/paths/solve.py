@@ -32,7 +32,9 @@ def _start(start: PathSolution | Array | None, node: Array) -> None:
             f"start must be the PathSolution of an earlier solve, or its branch, not {start!r}"
         )
     if not np.array_equal(start._node[:, layout.KIND], node[:, layout.KIND]):
-        raise GeometryError("start belongs to a path over other obstacles: number and kinds must be the same")
+        raise GeometryError(
+            "start belongs to a path over different obstacles: number and kinds must be the same"
+        )
     node[:, SAVED] = start._saved
 
 
@@ -62,7 +64,7 @@ def solve_path(
         The solution. Check `converged`: if no path was found, `status` says why.
 
     Raises:
-        GeometryError: the input describes no scene.
+        GeometryError: an argument is not valid.
     """
     tol = validation.positive(tol, "tol", GeometryError)
     here, there = point(origin, "origin"), point(insertion, "insertion")
@@ -93,15 +95,13 @@ def _solve_with(
     options: dict[str, Any],
     info: Array,
 ) -> None:
-    """Solve span after span with one of the paper's methods and evaluate the result with the kernels."""
+    """Solve one span after the other with one of the paper's methods, and evaluate the result with the kernels."""
     from mjwrap import methods
 
     if method not in methods.METHODS:
-        raise GeometryError(f"method {method!r} is none of: newton, {', '.join(methods.METHODS)}")
+        raise GeometryError(f"method must be one of newton, {', '.join(methods.METHODS)}, not {method!r}")
     if node[:, layout.INSIDE].any():
-        raise GeometryError(
-            f"method {method!r} finds no path that is held inside an obstacle; method 'newton' does"
-        )
+        raise GeometryError(f"method {method!r} cannot hold a path inside an obstacle; use method 'newton'")
     good, iterations, evaluations = True, 0, 0
     stops = [k for k, obstacle in enumerate(obstacles) if isinstance(obstacle, ViaPoint)] + [len(obstacles)]
     first, here = 0, np.array(origin)

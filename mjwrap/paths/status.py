@@ -1,4 +1,4 @@
-"""The statuses with which the search for a path ends."""
+"""The statuses of a path, and their messages."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _MESSAGES = {
     "NOT_MINIMAL": "the tangent path found is not a local minimum of length; a string would slip off it",
     "PENETRATING": "surfaces overlap where the path would touch them, so a part of it lies inside one",
     "NON_FINITE": "a pose or an end point is not finite",
-    "OUT_OF_RANGE": "the path touches a surface beyond the end of it, where it does not exist",
-    "NO_GEODESIC": "no geodesic leads round the surface that way; a string would slip off its end",
-    "UNKNOWN_SURFACE": "the rows of a surface are of a kind that the kernels do not know: they were damaged",
+    "OUT_OF_RANGE": "the path touches a surface beyond the end of the surface",
+    "NO_GEODESIC": "there is no geodesic round the surface on that side; a string would slip off its end",
+    "UNKNOWN_SURFACE": "the rows of a surface are damaged: the kernels do not know its kind",
 }
 
 
 class Status(enum.IntEnum):
-    """How the search for a path ended; only `CONVERGED` is a solution."""
+    """The status of a path; only `CONVERGED` is a solution."""
 
     CONVERGED = layout.CONVERGED
     NOT_CONVERGED = layout.NOT_CONVERGED
@@ -34,5 +34,5 @@ class Status(enum.IntEnum):
 
     @property
     def message(self) -> str:
-        """What the status means, in one clause."""
+        """The meaning of the status, in one clause."""
         return _MESSAGES[self.name]

@@ -70,14 +70,14 @@ def solve_sweep(
         obstacles: n obstacles and via points. Their own poses are not used.
         pos: (T, n, 3) positions of the obstacles, world [m].
         quat: (T, n, 4) orientations of the obstacles, w, x, y, z.
-        warm: start each pose from the ones before, and keep their branch; otherwise each pose is a cold start.
+        warm: start each pose from the previous ones, and keep their branch; otherwise each pose is a cold start.
         tol: largest tangency error of a solution.
 
     Returns:
         Length, status and cost of every pose.
 
     Raises:
-        GeometryError: an array has another shape or is not finite.
+        GeometryError: an array has a wrong shape or is not finite.
     """
     tol = validation.positive(tol, "tol", GeometryError)
     n = len(obstacles)

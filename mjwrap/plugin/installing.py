@@ -1,4 +1,4 @@
-"""Puts the plugin into a model: `install` for an MjSpec, `load` for a file."""
+"""Add the plugin to a model: `install` for an MjSpec, `load` for a file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
-from mjwrap.plugin.blocks.reading import read_muscles
+from mjwrap.plugin.blocks.instance_muscles import read_muscles
 from mjwrap.plugin.blocks.transmission_part import check_moment_columns
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error
@@ -34,26 +34,26 @@ _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.m
 
 
 def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
-    """Give the muscles of an MjSpec to the engine plugin, and compile a model whose `mj_step` runs them.
+    """Add the engine plugin to an MjSpec, and compile a model whose `mj_step` runs the muscles.
 
-    The spec itself is changed (an instance of the plugin, actuators without force, tendons too thin to be seen), so
-    that it can be compiled again, attached and saved. The plugin draws the muscles. If an error is raised, the spec
-    is as it was.
+    The spec itself is changed, so that it can be compiled again, attached and saved: it gets an instance of the
+    plugin, actuators without force, and invisible tendons, because the plugin draws the muscles. If an error is
+    raised, the spec is unchanged.
 
     Args:
         spec: the model.
         mode: "wrench" adds the muscles' forces to xfrc_applied. "transmission" gives length, velocity and moment along
-            mjwrap's paths to every actuator on a spatial tendon whose force MuJoCo itself computes; muscles of other
-            laws act by wrenches.
-        keep_tendons: keep tendons that are only there for the route of a muscle, so that MuJoCo computes them;
-            otherwise the returned model leaves out those that nothing else needs.
+            mjwrap's paths to every actuator on a spatial tendon whose force MuJoCo computes; muscles with other laws
+            act by wrenches.
+        keep_tendons: let MuJoCo also compute tendons that only declare the route of a muscle; by default the returned
+            model leaves them out.
 
     Returns:
         The compiled model.
 
     Raises:
-        ModelError: the muscles cannot be read, or a moment has no room for all bodies of its path.
-        VersionError: this MuJoCo is unknown.
+        ModelError: the muscles cannot be read, or MuJoCo cannot store the moment of a path.
+        VersionError: the layout of the installed MuJoCo could not be verified.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
@@ -69,7 +69,7 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjM
     model = _compile(spec)
     if int(model.opt.disableflags) & _BOTH_OFF == _BOTH_OFF:
         raise ModelError(
-            "MuJoCo calls no passive plugins while springs and dampers are both disabled; enable one of them"
+            "MuJoCo does not call the plugin while springs and dampers are both disabled; enable one of them"
         )
     marks.zero_disabled_ranges(model)
     with Takeover(model).original_limits():
@@ -78,7 +78,7 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjM
         declared = _declared(model, mode, taken)
         muscles = [muscle for muscle in declared if muscle.name not in taken]
         if not muscles and not taken:
-            raise ModelError(f"the model declares no muscle that mjwrap could drive{_hint(spec, mode)}")
+            raise ModelError(f"the model declares no muscle for mjwrap{_hint(spec, mode)}")
         disable_actuators(spec, model, muscles)
     names = [muscle.name for muscle in muscles]
     plan, muscles = read_muscles(model, names, mode)
@@ -94,10 +94,10 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjM
 
 
 def _remove_earlier(spec: mujoco.MjSpec, mode: str) -> None:
-    """Give the spec's own muscles back that an earlier install has taken, so that they are read anew."""
+    """Undo an earlier install for the spec's own muscles, so that they are read again."""
     for element in spec_instances(spec):
         if element.name != PLUGIN_INSTANCE:
-            continue  # of an attached model
+            continue  # the instance of an attached model
         for name in configuration_of(element).muscles:
             enable_actuator(spec, name)
             show_tendon(spec, name)
@@ -105,9 +105,9 @@ def _remove_earlier(spec: mujoco.MjSpec, mode: str) -> None:
 
 
 def _declared(model: mujoco.MjModel, mode: str, taken: dict[str, str]) -> list[MuscleDeclaration]:
-    """Return the muscles of a model, each as its mode declares it: that of an attached model, or the new one.
+    """Return the muscles of a model, each read for its mode: the mode of an attached model, or the new mode.
 
-    taken: the modes of the muscles that instances of attached models drive, by name.
+    taken: modes of the muscles of attached models, by name.
     """
     return [
         muscle
@@ -118,7 +118,7 @@ def _declared(model: mujoco.MjModel, mode: str, taken: dict[str, str]) -> list[M
 
 
 def _hint(spec: mujoco.MjSpec, mode: str) -> str:
-    """Return what else there is to say where a model declares no muscle."""
+    """Return a hint for the error of a model that declares no muscle."""
     if mode == TRANSMISSION:
         return ", and no actuator on a spatial tendon"
     return "; other actuators on spatial tendons are driven with mode='transmission'" if spec.tendons else ""
@@ -127,19 +127,19 @@ def _hint(spec: mujoco.MjSpec, mode: str) -> str:
 def load(
     path: str | os.PathLike[str], mode: str | None = None, *, keep_tendons: bool = False
 ) -> mujoco.MjModel:
-    """Load an MJCF file with its muscles in the engine plugin (`install`), or an MJB file of a model that has it.
+    """Load an MJCF file and `install` the engine plugin, or load an MJB file of a model that has the plugin.
 
     Args:
         path: the file.
         mode: as in `install`; "wrench" if None. An MJB file has its own mode.
-        keep_tendons: as in `install`; for MJCF files.
+        keep_tendons: as in `install`; only for MJCF files.
 
     Returns:
         The compiled model.
 
     Raises:
         ModelError: as in `install`, or the file cannot be loaded, or an MJB file has another mode.
-        VersionError: this MuJoCo is unknown.
+        VersionError: the layout of the installed MuJoCo could not be verified.
     """
     register()
     model = read_model(path)
@@ -155,7 +155,7 @@ def load(
         )
     if not instances:
         raise ModelError(
-            f"{path} has no plugin of mjwrap, and an MJB file cannot be changed; load its XML instead"
+            f"{path} does not contain mjwrap's plugin, and an MJB file cannot be changed; load its XML instead"
         )
     return model
 

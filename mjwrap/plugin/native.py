@@ -1,4 +1,4 @@
-"""Names the muscles of an installed model that the plugin has left to MuJoCo, with the reasons."""
+"""List the muscles of an installed model that stay with MuJoCo, with the reasons."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from mjwrap.plugin.spec.tendons import restore_tendons
 
 
 def native(model: mujoco.MjModel) -> dict[str, str]:
-    """Return the actuators of an installed model that keep MuJoCo's own path, by name, each with the reason.
+    """Return the actuators of an installed model that keep MuJoCo's own path, by name, with the reason.
 
-    Muscles, and in transmission mode all actuators on spatial tendons. `StateError` where there is no plugin.
+    These are muscles and, in mode "transmission", all actuators on spatial tendons. Raises `StateError` if the model
+    has no plugin.
     """
     configurations = [configuration_at(model._address, instance) for instance in instances(model)]
     twin = copy.copy(model)

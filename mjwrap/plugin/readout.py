@@ -1,4 +1,4 @@
-"""Reads what the plugin last computed for an mjData, and sets the excitations of muscles without an actuator."""
+"""Read the plugin's last results for an mjData, and set the excitations of muscles without an actuator."""
 
 from __future__ import annotations
 
@@ -24,7 +24,19 @@ _COLUMNS = ("length", "velocity", "tension", "activation", "fiber", "status", "f
 
 @dataclass(frozen=True)
 class Readout:
-    """The muscles of all instances in a model, copies: (n,) each, as `MuscleSystem` names and measures them."""
+    """The plugin's results for the muscles of a model: copies, (n,) each, with units and signs as in `MuscleSystem`.
+
+    Attributes:
+        names: the muscles' names, in the order of all arrays.
+        length: musculotendon lengths [m].
+        velocity: lengthening speeds [m/s].
+        tension: tensions [N], never negative.
+        activation: activations [-].
+        fiber_length: fibre lengths [m], 0 for a law without fibres.
+        status: codes of `mjwrap.Status`.
+        failures: number of steps without a path since the last reset.
+        transmitted: whether MuJoCo's own actuator pulls the muscle; its force is then the tension.
+    """
 
     names: list[str]
     length: Array
@@ -33,15 +45,17 @@ class Readout:
     activation: Array
     fiber_length: Array
     status: NDArray[np.int64]
-    failures: NDArray[np.int64]  # steps since the last reset without a path
-    transmitted: NDArray[np.bool_]  # pulled by MuJoCo's own actuator, whose force this tension is
+    failures: NDArray[np.int64]
+    transmitted: NDArray[np.bool_]
 
 
 def instances(model: mujoco.MjModel) -> list[int]:
-    """Return the ids of mjwrap's instances in a model; `StateError` where there is none."""
+    """Return the ids of mjwrap's instances in a model; `StateError` if there are none."""
     found = own_instances(model)
     if not found:
-        raise StateError("this model has no muscles in the engine plugin; install or load puts them there")
+        raise StateError(
+            "this model does not contain the engine plugin; add it with mjwrap.install or mjwrap.load"
+        )
     return found
 
 
@@ -49,7 +63,9 @@ def block_address(data: mujoco.MjData, instance: int) -> int:
     """Return the address of an instance's block."""
     address = find_block(data._address, instance)
     if address == 0:
-        raise StateError("this mjData has no muscles of the engine plugin: it was made without them")
+        raise StateError(
+            "this mjData was made without the engine plugin; make a new one from the installed model"
+        )
     return address
 
 
@@ -59,7 +75,7 @@ def head_of(block: int) -> NDArray[np.int64]:
 
 
 def read(data: mujoco.MjData) -> Readout:
-    """Return what the plugin computed last for `data`: in `mj_forward`, or in `mj_step` at the state it began with."""
+    """Return the plugin's last results for `data`: from `mj_forward`, or from the start of the last `mj_step`."""
     names: list[str] = []
     columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
     for instance in instances(data.model):
@@ -77,7 +93,7 @@ def read(data: mujoco.MjData) -> Readout:
 
 
 def transmit(data: mujoco.MjData, block: int, tension: Array) -> NDArray[np.bool_]:
-    """Set the tensions (n,) of a block's muscles that MuJoCo's own actuators pull; return which ones (n,) they are."""
+    """Set the tensions (n,) of a block's muscles that MuJoCo's actuators pull; return which ones (n,) these are."""
     head = head_of(block)
     output = _outputs(block + int(head[bk.A_TRANSMISSION]), int(head[bk.MUSCLES]))
     transmitted = output >= 0
@@ -87,7 +103,7 @@ def transmit(data: mujoco.MjData, block: int, tension: Array) -> NDArray[np.bool
 
 
 def _outputs(part: int, n: int) -> NDArray[np.int64]:
-    """Return the outputs (n,) of actuators that pull their muscles, -1 elsewhere, from a part of a block."""
+    """Return the outputs (n,) of the actuators that pull their muscles, -1 for others, from a part of a block."""
     head = np.ctypeslib.as_array((ctypes.c_int64 * tr.HEAD).from_address(part))
     if not head[tr.COUNT]:
         return np.full(n, -1, dtype=np.int64)
@@ -97,7 +113,7 @@ def _outputs(part: int, n: int) -> NDArray[np.int64]:
 def excitations(data: mujoco.MjData) -> dict[str, Array]:
     """Return the excitation of every muscle by name, as a writable view (1,) of `data.plugin_state`.
 
-    It counts where a muscle has no actuator, whose control is the excitation otherwise. A reset makes it zero.
+    It is used for muscles without an actuator; for others the excitation is the control. A reset sets it to zero.
     """
     model, found = data.model, {}
     for instance in instances(model):

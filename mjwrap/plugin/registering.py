@@ -1,7 +1,7 @@
-"""Makes the plugin known to MuJoCo, once a process.
+"""Register the plugin with MuJoCo, once per process.
 
-MuJoCo calls `nstate` while it compiles a model and `init` for every new mjData: the only callbacks in Python. Whatever
-they need they read from the model, whoever compiled it, in this process or another.
+MuJoCo calls `nstate` while it compiles a model, and `init` for every new mjData: the only callbacks in Python. They
+read everything from the model, because it may have been compiled in another process.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import threading
 from mjwrap.errors import VersionError
 from mjwrap.mjcf.marks import PLUGIN_NAME
 from mjwrap.plugin.blocks.allocation import entries, give_block
-from mjwrap.plugin.blocks.reading import is_reading
+from mjwrap.plugin.blocks.instance_muscles import is_reading
 from mjwrap.plugin.callbacks.hooks import compile_hooks
 from mjwrap.plugin.mujoco_c.offsets import offsets
 from mjwrap.plugin.mujoco_c.probe import verify_plugin_fields
@@ -25,17 +25,17 @@ from mjwrap.plugin.spec.configuration import ATTRIBUTES, configuration_at
 
 _NSTATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int)
 _INIT = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
-_here = threading.local()  # .error: why a callback of this thread failed last
+_here = threading.local()  # .error: the reason of the last failure of a callback in this thread
 
 
 @functools.cache
 def register() -> None:
-    """Make the plugin known to MuJoCo; `VersionError` where the installed MuJoCo cannot be verified."""
+    """Register the plugin with MuJoCo; `VersionError` if the installed MuJoCo cannot be verified."""
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         raise VersionError("the engine plugin needs compiled kernels; NUMBA_DISABLE_JIT is set")
     offsets()
     verify_plugin_fields()
-    drawing()  # warns here where it cannot
+    drawing()  # warns here if drawing is not possible
     entries()
     hooks = compile_hooks(offsets().data)
     python = {"nstate": _NSTATE(_nstate), "init": _INIT(_init)}
@@ -43,7 +43,7 @@ def register() -> None:
 
 
 def take_error() -> Exception | None:
-    """Return why a callback of this thread failed last, and forget it."""
+    """Return the reason of the last failure of a callback in this thread, and forget it."""
     error = getattr(_here, "error", None)
     _here.error = None
     return error
@@ -51,12 +51,14 @@ def take_error() -> Exception | None:
 
 def _failed(error: Exception) -> int:
     _here.error = error
-    print(f"mjwrap: {error}", file=sys.stderr, flush=True)  # MuJoCo only says that an init failed
+    print(
+        f"mjwrap: {error}", file=sys.stderr, flush=True
+    )  # MuJoCo's own message only says that an init failed
     return -1
 
 
 def _nstate(model: int, instance: int) -> int:
-    """Return how many numbers of plugin_state an instance needs, -1 where that cannot be told."""
+    """Return the number of entries of plugin_state that an instance needs, -1 on failure."""
     try:
         return configuration_at(model, instance).numbers
     except Exception as error:
@@ -64,7 +66,7 @@ def _nstate(model: int, instance: int) -> int:
 
 
 def _init(model: int, data: int, instance: int) -> int:
-    """Give a new mjData its block; what stood in its slot of plugin_data before is not defined."""
+    """Allocate the block of a new mjData; its entry of plugin_data is not defined before."""
     slots = ctypes.c_uint64.from_address(data + offsets().data["plugin_data"]).value
     slot = ctypes.c_uint64.from_address(slots + 8 * instance)
     slot.value = 0

@@ -1,1 +1,1 @@
-"""Makes poses of a model, takes muscles from pose to pose, and finds jumps of their lengths on the way."""
+"""Make poses of a model, follow muscles' paths from pose to pose, and find jumps of their lengths."""

@@ -1,4 +1,4 @@
-"""Finds jumps of a length or its slope along a sweep: halving an interval tells a jump from a steep stretch."""
+"""Find jumps of a length or its slope along a sweep; halving an interval distinguishes a jump from a steep stretch."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Probe = Callable[[float], tuple[float, float]]  # place in the sweep -> length, slope
+Probe = Callable[[float], tuple[float, float]]  # position in the sweep -> length, slope
 
-LENGTH = 1e-6  # [m] smallest jump in length that is told
-SLOPE = 1e-5  # [m/rad] smallest jump in slope that is told
-NARROW = 1e-9  # of the sweep's range: the width at which a jump is told from a steep stretch
-LASTING = 0.5  # a jump keeps this share of its size while the width shrinks a thousandfold
-MOST = 3  # intervals looked into, for each muscle, sweep and kind
+LENGTH = 1e-6  # [m] smallest jump in length that is reported
+SLOPE = 1e-5  # [m/rad] smallest jump in slope that is reported
+NARROW = 1e-9  # width, relative to the sweep's range, at which a jump is distinguished from a steep stretch
+LASTING = 0.5  # a jump keeps at least this share of its size while the width is divided by a thousand
+MOST = 3  # largest number of intervals that are halved, for each muscle, sweep and kind
 
 
-def odd_intervals(
+def jump_candidates(
     at: Array, length: Array, slope: Array, good: NDArray[np.bool_]
 ) -> list[tuple[int, float | None]]:
-    """Return the intervals in which length (None) or slope (its usual bend) change as a smooth curve would not.
+    """Return the intervals in which length (None) or slope (its bend beside the interval) may jump.
 
-    at, length, slope, good: (T,); good: whether there is a length. An interval k is from sample k to the next.
+    at, length, slope, good: (T,); good: whether there is a length. Interval k is from sample k to the next.
     """
     h, m, l = np.diff(at), slope, length
     whole = good[1:] & good[:-1]
@@ -41,8 +41,8 @@ def refine_jump(
 ) -> tuple[float, float, float] | None:
     """Halve an interval towards its jump; return (place, jump in length, jump in slope), or None if it is smooth.
 
-    bend: None: follow the half whose length disobeys its slopes more; a number: follow the larger change of slope, less
-    `bend` times the width, which is how the slope changes beside the interval.
+    bend: None: choose the half whose change of length agrees less with its slopes; a number: choose the half with the
+    larger change of slope, less `bend` times the width, which is the change beside the interval.
     """
     (l0, m0), (l1, m1) = probe(low), probe(high)
     wide: tuple[float, float] | None = None

@@ -1,4 +1,4 @@
-"""Makes poses of a model: sweeps of each joint over its range, and random poses, with coupled joints in place."""
+"""Make poses of a model: sweeps of each joint over its range, and random poses, with coupled joints in place."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _HINGE, _SLIDE, _BALL = int(_KINDS.mjJNT_HINGE), int(_KINDS.mjJNT_SLIDE), int(_K
 
 @dataclass(frozen=True)
 class PoseSequence:
-    """Poses to evaluate in order.
+    """A sequence of poses to evaluate in order.
 
-    name: a joint's, or "random poses"; at (T,): the joint's position [m or rad], or a running number; qpos (T, nq);
-    tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether one pose leads to the next;
-    base: the number of the pose around which a joint is swept; alone: whether that joint follows another one, so
-    that no motion of the model leads there.
+    name: a joint's name, or "random poses"; at (T,): the joint's position [m or rad], or the index; qpos (T, nq);
+    tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether the poses form a motion;
+    base: the number of the pose around which a joint is swept; alone: whether a coupled joint is moved alone, which no
+    motion of the model does.
     """
 
     name: str
@@ -38,7 +38,7 @@ class PoseSequence:
 
 
 class PoseMaker:
-    """Makes poses of a model around a base pose qpos (nq,), in which coupled joints are put where they follow."""
+    """Make poses of a model around a base pose qpos (nq,), with coupled joints in place."""
 
     def __init__(self, model: mujoco.MjModel, base: Array, seed: int = 0, number: int = 0) -> None:
         self.model = model
@@ -46,15 +46,15 @@ class PoseMaker:
         self.number = number
         self.rng = np.random.default_rng(seed)
         self._coupled = CoupledJoints(model)
-        self._without = {-1: self._coupled}  # by the joint that is swept although it follows another one
+        self._without = {-1: self._coupled}  # by the joint that is swept although it follows another joint
         self._coupled.place(self.base)
 
     def joints(self) -> list[int]:
-        """Return the joints that can be swept: all but free ones."""
+        """Return the joints that can be swept: all except free joints."""
         return [j for j in range(self.model.njnt) if int(self.model.jnt_type[j]) in (_HINGE, _SLIDE, _BALL)]
 
     def follows(self, joint: int) -> bool:
-        """Return whether an equality puts a joint where another one wants it, or at a place of its own."""
+        """Return whether an equality determines the position of a joint."""
         return joint in self._coupled.leader
 
     def axes(self, joint: int) -> range:
@@ -71,7 +71,7 @@ class PoseMaker:
         return qpos
 
     def span(self, joint: int) -> tuple[float, float]:
-        """Return the range to sweep [m or rad]: the joint's own, else half a turn or half the model's extent."""
+        """Return the range to sweep [m or rad]: the joint's range, else half a turn or half the model's extent."""
         model = self.model
         kind = int(model.jnt_type[joint])
         low, high = (float(x) for x in model.jnt_range[joint])
@@ -103,7 +103,7 @@ class PoseMaker:
         return qpos, tangent
 
     def _couplings(self, swept: int = -1) -> CoupledJoints:
-        """Return the coupled joints, of which the one that is swept follows none."""
+        """Return the coupled joints; the swept joint counts as independent."""
         free = swept if swept in self._coupled.leader else -1
         if free not in self._without:
             self._without[free] = CoupledJoints(self.model, free)
@@ -113,7 +113,7 @@ class PoseMaker:
         return self.rng.uniform(-1.0, 1.0, (count, self.model.nv))
 
     def sweep(self, joint: int, samples: int, axis: int = 0) -> PoseSequence:
-        """Return a sweep of one joint over its range; the others stay, or follow where they are coupled to it.
+        """Return a sweep of one joint over its range; the others stay, or follow it if they are coupled to it.
 
         A joint that follows another one is moved alone.
         """
@@ -128,11 +128,11 @@ class PoseMaker:
         return PoseSequence(name, at, qpos, tangent, velocities, True, self.number, alone)
 
     def maker(self, joint: int, axis: int = 0) -> Callable[[float], tuple[Array, Array]]:
-        """Return the function value -> (pose, tangent) of a sweep, for a closer look between its samples."""
+        """Return the function value -> (pose, tangent) of a sweep, for positions between its samples."""
         return lambda value: self.place(joint, axis, value)
 
     def random(self, count: int) -> PoseSequence:
-        """Return poses with every joint drawn from its range, on its own; free joints stay at the base pose."""
+        """Return poses with every joint drawn independently from its range; free joints stay at the base pose."""
         model = self.model
         qpos = np.tile(self.base, (count, 1))
         for row in qpos:

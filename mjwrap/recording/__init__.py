@@ -1,4 +1,4 @@
-"""Recordings of a run, for the rerun viewer: `Recorder` writes one, `read_summary` says what one holds."""
+"""Recordings of a run for the rerun viewer: `Recorder` writes one, `read_summary` describes its contents."""
 
 from mjwrap.recording.playback import Server, Summary, open_native, read_summary, serve
 from mjwrap.recording.recorder import Recorder

@@ -31,8 +31,8 @@ GROUP_TITLES = {
 LINE = 0.17  # height of a legend's line, as part of a small plot's
 LEGEND = 16  # joints whose names fit beside their curves
 SIDE = 6  # joints whose moment arms are shown together
-MANY = 100  # muscles from which on their forces hide more than they show
-SCENERY = 2.0  # a mesh of the world so many times larger than all muscles is a backdrop
+MANY = 100  # number of muscles from which arrows of forces would hide too much
+SCENERY = 2.0  # a mesh of the world that is so many times larger than all muscles counts as scenery
 
 
 class First(NamedTuple):
@@ -44,12 +44,12 @@ class First(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Diagonal of the box around all paths [m], 0 where there is none."""
+        """Diagonal of the box around all paths [m], 0 if there is no path."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) else 0.0
 
 
 def blueprint(scene: Scene, first: First) -> rrb.Blueprint:
-    """3D view looking at the muscles, and time series: a page, or a tab for each group and one for all of them."""
+    """Return a 3D view of the muscles, and time series: one page, or a tab for each group and one for all groups."""
     hidden = [*scene.hidden, *_scenery(scene, first.size)]
     if len(scene.muscle_names) > MANY:
         hidden.append("world/forces")
@@ -100,7 +100,7 @@ def _plot(
 
 
 def _grid(views: Sequence[rrb.View], name: str, names: int = PAGE) -> rrb.Container:
-    """Two columns of plots, with room for a legend of so many names in the first row; one column where they are few."""
+    """Return two columns of plots, with space for a legend of `names` lines in the first row; one column if few."""
     if len(views) <= 3:
         return rrb.Vertical(contents=views, name=name)
     shares = [max(1.3, LINE * names + 0.4)] + [1.0] * ((len(views) - 1) // 2)
@@ -108,7 +108,7 @@ def _grid(views: Sequence[rrb.View], name: str, names: int = PAGE) -> rrb.Contai
 
 
 def _overview(scene: Scene) -> rrb.Container:
-    """Curves of whole groups."""
+    """Return the curves of whole groups."""
     views = [
         _plot(scene.group_series[q], title, legend=q == "activation", unit=q == "activation")
         for q, title in GROUP_TITLES.items()
@@ -118,7 +118,7 @@ def _overview(scene: Scene) -> rrb.Container:
 
 
 def _page(scene: Scene, page: list[int], first: First, name: str) -> rrb.Container:
-    """Plots of all quantities of up to `PAGE` muscles, and of their moment arms about the joint that they turn most."""
+    """Return plots of all quantities of up to `PAGE` muscles, and of their largest moment arms."""
     views: list[rrb.View] = [
         _plot((scene.series[q][i] for i in page), TITLES[q], legend=q == "activation", unit=q == "activation")
         for q in TITLES
@@ -131,7 +131,7 @@ def _page(scene: Scene, page: list[int], first: First, name: str) -> rrb.Contain
 
 
 def _main_joint(scene: Scene, page: list[int], first: First) -> list[rrb.View]:
-    """The moment arms of a page's muscles about the coordinate where they are largest in all; none where none cross."""
+    """Return plots of a page's moment arms about the coordinate for which their sum is largest; none if none cross."""
     best, best_sum = -1, 0.0
     for k, (coordinate, arms) in enumerate(zip(scene.coordinates, first.arms, strict=False)):
         total = float(arms[np.isin(coordinate.muscles, page)].sum())
@@ -154,7 +154,7 @@ def _main_joint(scene: Scene, page: list[int], first: First) -> list[rrb.View]:
 
 
 def _moment_arms(scene: Scene) -> rrb.Container:
-    """Moment arms about every coordinate that is free to move, `SIDE` to a page."""
+    """Return plots of the moment arms about every coordinate that can move, `SIDE` to a page."""
     free = [k for k, coordinate in enumerate(scene.coordinates) if not coordinate.follows]
     free = free or list(range(len(scene.coordinates)))
     pages = []
@@ -176,7 +176,7 @@ def _moment_arms(scene: Scene) -> rrb.Container:
 
 
 def _joints(scene: Scene) -> rrb.Container:
-    """Where the joints are, angles apart from lengths."""
+    """Return plots of the joints' positions, angles and lengths separately."""
     views = []
     for turns, title in ((True, "joint angles [rad]"), (False, "positions of slides [m]")):
         shown = [path for k, path in scene.joints.items() if scene.coordinates[k].turns is turns]
@@ -186,7 +186,7 @@ def _joints(scene: Scene) -> rrb.Container:
 
 
 def _solver(scene: Scene) -> rrb.Container:
-    """Whether and how the paths were found."""
+    """Return plots of the path solver's status and iterations."""
     views = [_plot(scene.series[q], TITLES[q]) for q in ("iterations", "status")]
     return rrb.Vertical(*views, rrb.TextLogView(origin="/solver", name="paths lost and found"), name="solver")
 
@@ -197,7 +197,7 @@ def _title(scene: Scene, page: list[int]) -> str:
 
 
 def _scenery(scene: Scene, size: float) -> list[str]:
-    """Geoms that would stand between the eye and the muscles: meshes of the world far larger than all muscles."""
+    """Return the geoms that would hide the muscles: meshes of the world that are much larger than all muscles."""
     model = scene.model
     return [
         scene.geoms[i]
@@ -209,9 +209,9 @@ def _scenery(scene: Scene, size: float) -> list[str]:
 
 
 def _eye(scene: Scene, first: First) -> rrb.EyeControls3D | None:
-    """An eye that looks along the direction in which the muscles are thinnest, from the side with fewer bodies.
+    """Return a camera that looks along the direction of the muscles' smallest extent, from the side with fewer bodies.
 
-    It follows a body that is free in the world and carries muscles.
+    The camera follows a body with muscles that moves freely in the world.
     """
     points, bodies, size = first.points, first.bodies[1:], first.size
     if len(points) < 2 or size == 0:
@@ -219,7 +219,9 @@ def _eye(scene: Scene, first: First) -> rrb.EyeControls3D | None:
     target = 0.5 * (points.min(axis=0) + points.max(axis=0))
     axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
     level = np.array([*axes[-1][:2], 0.0])
-    if len(axes) < 3 or np.linalg.norm(level) < 0.3:  # no thinnest direction, or the vertical: from the front
+    if (
+        len(axes) < 3 or np.linalg.norm(level) < 0.3
+    ):  # no unique direction, or the vertical one: look from the front
         level = np.array([0.0, 1.0, 0.0])
     level /= np.linalg.norm(level)
     if len(bodies) and (bodies.mean(axis=0) - target) @ level > 0:
@@ -231,7 +233,7 @@ def _eye(scene: Scene, first: First) -> rrb.EyeControls3D | None:
 
 
 def _followed(scene: Scene) -> str | None:
-    """A geom of the body at the root of all muscles, where that moves freely, or of the next body that has one."""
+    """Return a geom of the body from which all muscles' bodies descend, if it moves freely, or of a body below it."""
     model = scene.model
     roots = {int(model.body_rootid[model.site_bodyid[muscle.origin_site]]) for muscle in scene.declarations}
     root = roots.pop() if len(roots) == 1 else 0

@@ -1,5 +1,4 @@
-"""Columns of a recording: NumPy rows are gathered during the run and turned into Arrow columns a few hundred at
-once."""
+"""Columns of a recording: NumPy rows are collected during the run and converted to Arrow columns in batches."""
 
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -21,13 +20,13 @@ _QUAT = rr.components.RotationQuatBatch._ARROW_DATATYPE
 
 _BLUE = np.array([40.0, 80.0, 230.0])
 _RED = np.array([230.0, 30.0, 30.0])
-_SHADES = 4096  # of the colours between them, far finer than the eight bits of a channel
+_SHADES = 4096  # steps of the colour scale, many more than a channel of eight bits can show
 
 Array = npt.NDArray[Any]
 
 
 def activation_colors(activation: npt.ArrayLike) -> npt.NDArray[np.uint32]:
-    """Colours 0xRRGGBBAA of activations (n,): blue at 0, red at 1, straight between, clipped outside."""
+    """Return colours 0xRRGGBBAA of activations (n,): from blue at 0 to red at 1, linear between, clipped outside."""
     share = np.clip(np.asarray(activation, dtype=np.float64), 0.0, 1.0)
     return _palette()[np.rint(share * _SHADES).astype(np.intp)]
 
@@ -68,24 +67,24 @@ def _field(entity: str, component: rr.ComponentDescriptor, datatype: pa.DataType
 
 
 def scalar_table(entities: Sequence[str]) -> Table:
-    """One or more float64 a row for each entity."""
+    """Return a table with one or more float64 per row for each entity."""
     return Table((entity, rr.Scalars.descriptor_scalars(), pa.float64()) for entity in entities)
 
 
-def scalar_columns(values: Array, room: Array) -> list[pa.Array]:
-    """Values (T, m) as m columns of T rows; they stand in room (m, T)."""
+def scalar_columns(values: Array, memory: Array) -> list[pa.Array]:
+    """Convert values (T, m) to m columns of T rows; memory (m, T): for the result."""
     rows, columns = values.shape
-    room[:] = values.T
-    # one array holds all columns, one after the other; a column is a slice of it, which costs next to nothing
-    whole = pa.ListArray.from_arrays(_one_each(rows * columns), pa.array(room.ravel()))
+    memory[:] = values.T
+    # one array contains all columns, one after the other; a column is a slice of it, which costs almost nothing
+    whole = pa.ListArray.from_arrays(_one_each(rows * columns), pa.array(memory.ravel()))
     return [whole.slice(i * rows, rows) for i in range(columns)]
 
 
-def vector_columns(values: Array, widths: Sequence[int], room: Array) -> list[pa.Array]:
-    """Values (T, K) as a column of T rows for each width, with so many values a row; they stand in room (T K,)."""
+def vector_columns(values: Array, widths: Sequence[int], memory: Array) -> list[pa.Array]:
+    """Convert values (T, K) to a column of T rows for each width (values per row); memory (T K,): for the result."""
     rows, columns, start = len(values), [], 0
     for width in widths:
-        part = room[rows * start : rows * (start + width)]
+        part = memory[rows * start : rows * (start + width)]
         part.reshape(rows, width)[:] = values[:, start : start + width]
         columns.append(pa.ListArray.from_arrays(_one_each(rows, width), pa.array(part)))
         start += width
@@ -93,19 +92,19 @@ def vector_columns(values: Array, widths: Sequence[int], room: Array) -> list[pa
 
 
 def text_table(entity: str) -> Table:
-    """A line of text and its level a row."""
+    """Return a table with a line of text and its level per row."""
     text, level = rr.TextLog.descriptor_text(), rr.TextLog.descriptor_level()
     return Table([(entity, text, pa.string()), (entity, level, pa.string())])
 
 
 def text_columns(lines: Sequence[str], levels: Sequence[str]) -> list[pa.Array]:
-    """Lines of text and their levels as two columns."""
+    """Convert lines of text and their levels to two columns."""
     offsets = _one_each(len(lines))
     return [pa.ListArray.from_arrays(offsets, pa.array(each, pa.string())) for each in (lines, levels)]
 
 
 def pose_table(entities: Sequence[str]) -> Table:
-    """A translation and a rotation a row for each entity."""
+    """Return a table with a translation and a rotation per row for each entity."""
     rows = []
     for entity in entities:
         rows.append((entity, rr.Transform3D.descriptor_translation(), _VEC3))
@@ -114,7 +113,7 @@ def pose_table(entities: Sequence[str]) -> Table:
 
 
 def pose_columns(positions: Array, quaternions: Array) -> list[pa.Array]:
-    """Positions (T, m, 3) [m] and quaternions (T, m, 4) w-x-y-z as 2 m columns of T rows."""
+    """Convert positions (T, m, 3) [m] and quaternions (T, m, 4) w-x-y-z to 2 m columns of T rows."""
     rows, bodies = positions.shape[:2]
     offsets = _one_each(rows * bodies)
     turned = quaternions[..., [1, 2, 3, 0]].swapaxes(0, 1)
@@ -126,7 +125,7 @@ def pose_columns(positions: Array, quaternions: Array) -> list[pa.Array]:
 
 
 def path_table(paths: Sequence[str], contacts: Sequence[str], forces: Sequence[str]) -> Table:
-    """A line strip, its colour, a set of points and a set of arrows a row for each muscle."""
+    """Return a table with a line strip, its colour, a set of points and a set of arrows per row for each muscle."""
     rows = []
     for path, contact, force in zip(paths, contacts, forces, strict=True):
         rows.append((path, rr.LineStrips3D.descriptor_strips(), _STRIP))
@@ -143,9 +142,9 @@ def path_columns(
     arrows: tuple[Array, Array, Array],
     colors: Array,
 ) -> list[pa.Array]:
-    """Polylines, contact points and arrows of n muscles over T frames, as `History` returns them; colours (T, n).
+    """Convert polylines, contact points and arrows of n muscles over T frames, as from `History`; colours (T, n).
 
-    5 n columns of T rows. A muscle that has no path in a frame, because none was found yet, has an empty row there.
+    Returns 5 n columns of T rows. If no path of a muscle was found yet in a frame, its row is empty.
     """
     frames, n = colors.shape
     (points, sizes, strips), (touches, numbers), (tails, vectors, shafts) = paths, contacts, arrows

@@ -1,4 +1,4 @@
-"""Rows of a recording between two flushes: scalars for each state; poses, paths and forces for each displayed frame."""
+"""Rows of a recording between two flushes: scalars of each state; poses, paths and forces of each displayed frame."""
 
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,18 +12,18 @@ from mjwrap.recording import columns
 from mjwrap.recording.blueprint import First, blueprint
 from mjwrap.recording.scene import Scene
 from mjwrap.recording.stream import Stream
-from mjwrap.system.history import Room
+from mjwrap.system.history import BufferPool
 
 if TYPE_CHECKING:
     from mjwrap.system.results import Results
 
-EARLY = 1e-6  # part of a period by which a row may come too early, for times that are not exact
-LOG = "solver"  # entity of the lines that say which muscle has no path, and why
-ARROW = 0.3  # length of the strongest muscle's arrow, as part of the size of all paths
+EARLY = 1e-6  # share of a period by which a row may be early, because times are rounded
+LOG = "solver"  # entity of the lines that name muscles without a path, with the reason
+ARROW = 0.3  # length of the strongest muscle's arrow, relative to the size of all paths
 
 
 class Options(NamedTuple):
-    """What a Recorder was asked for; see there."""
+    """The options of a `Recorder`; see there."""
 
     rate: float | None
     path_rate: float
@@ -31,46 +31,46 @@ class Options(NamedTuple):
     force_scale: float | None
 
 
-class Beat:
-    """Due at the first time at or after every whole multiple of a period from its first time on."""
+class SampleTimer:
+    """A timer that is due at the first time after each multiple of a period, counted from its first time."""
 
     def __init__(self, rate: float | None) -> None:
         self._rate = rate
         self._start: float | None = None
         self._next = -math.inf
-        self._count = 0  # the multiple that comes next
+        self._count = 0  # the next multiple
 
     @property
     def next(self) -> float:
-        """The time [s] from which on a row is due."""
+        """Return the time [s] from which a row is due."""
         return self._next
 
     def due(self, time: float) -> bool:
-        """Whether a row is due at a time [s]; always where there is no rate."""
+        """Return whether a row is due at a time [s]; always true without a rate."""
         return time >= self._next
 
     def take(self, time: float) -> None:
-        """Note the row at a time; where it was due, the next one is due a period later."""
+        """Note a row at a time [s]; if it was due, the next one is due a period later."""
         if self._rate is None or time < self._next:
             return
         if self._start is None:
             self._start = time
-        # whole multiples, so that rounding does not add up
+        # whole multiples, so that rounding errors do not accumulate
         self._count += 1
         self._next = self._start + (self._count - EARLY) / self._rate
-        if time >= self._next:  # periods went by without a call
+        if time >= self._next:  # several periods passed without a call
             self._count = math.floor((time - self._start) * self._rate + EARLY) + 1
             self._next = self._start + (self._count - EARLY) / self._rate
 
 
 class Buffers:
-    """Room for `rows` states; `take` turns what is there into record batches and empties it."""
+    """Buffers for `rows` states; `take` converts them to record batches and empties them."""
 
     def __init__(self, scene: Scene, muscles: "Results", rows: int, options: Options) -> None:
         self._scene, self._muscles, self._options = scene, muscles, options
-        self._states, self._displays = Beat(options.rate), Beat(options.path_rate)
+        self._states, self._displays = SampleTimer(options.rate), SampleTimer(options.path_rate)
         self._time = np.empty(rows)
-        self._frame_rows = np.empty(rows, dtype=np.int64)  # the row that each frame belongs to
+        self._frame_rows = np.empty(rows, dtype=np.int64)  # the row of each frame
         self._qpos = np.zeros((rows, scene.model.nq))
         self._qpos_time = np.zeros(rows)
         self._joints = [scene.coordinates[k].qpos for k in scene.joints]
@@ -82,20 +82,20 @@ class Buffers:
         )
         self._force_scale = options.force_scale
         self._tables = _tables(scene)
-        self._room = Room()
-        self._before = np.zeros(len(scene.muscle_names))  # status of the last row that was taken
+        self._pool = BufferPool()
+        self._before = np.zeros(len(scene.muscle_names))  # status in the last row that was taken
         self._rows = self._frames = 0
         self._last_time = self._next_time = -math.inf
 
     @property
     def full(self) -> bool:
-        """Whether the next row has no room."""
+        """Whether the buffers are full."""
         return self._rows == len(self._time)
 
     def add(self, data: Any) -> bool:
-        """Copy what belongs to the muscles' last evaluation; return whether a row was due."""
+        """Copy the results of the muscles' last evaluation, if a row is due; return whether it was."""
         time = self._muscles.time
-        if self._last_time <= time < self._next_time:  # nearly every call
+        if self._last_time <= time < self._next_time:  # the most frequent case
             self._last_time = time
             return False
         if not time >= self._last_time:
@@ -121,11 +121,13 @@ class Buffers:
         self._frame_rows[frame] = row
         self._history.put_frame(frame, self._muscles.poses(data), self._options.spacing)
         self._qpos[frame] = data.qpos
-        self._qpos_time[frame] = data.time  # after a step it is the next one's, the results are of this one
+        self._qpos_time[frame] = (
+            data.time
+        )  # after a step the data have the next state, the results belong to this one
         self._frames = frame + 1
 
     def lay_out(self, stream: Stream) -> None:
-        """Log what waits for the first frame: the layout, which looks at the muscles, and the welded bodies."""
+        """Log what needs the first frame: the viewer's layout, which looks at the muscles, and the welded bodies."""
         if self._frames:
             arms = np.abs(self._history.moment_arms(1)[0])
             parts = np.split(arms, np.cumsum(self._widths)[:-1]) if self._widths else []
@@ -139,12 +141,12 @@ class Buffers:
         stream.blueprint(blueprint(self._scene, first))
 
     def take(self, done: bool) -> list[pa.RecordBatch]:
-        """All rows as record batches; the buffers are empty afterwards.
+        """Return all rows as record batches; the buffers are empty afterwards.
 
-        done: whether the batches that were taken before are written, so that theirs may be overwritten.
+        done: whether the batches taken before are written, so that their memory may be reused.
         """
         if not done:
-            self._room = Room()
+            self._pool = BufferPool()
         batches = self._take_states() if self._rows else []
         if self._frames:
             batches += self._take_frames()
@@ -180,11 +182,11 @@ class Buffers:
         return batches
 
     def _scalars(self, name: str, values: np.ndarray) -> list[pa.Array]:
-        """Columns of values (T, m) that stand in the room of a name."""
-        return columns.scalar_columns(values, self._room.array(name, values.shape[::-1]))
+        """Return columns of values (T, m), in the pool's memory of this name."""
+        return columns.scalar_columns(values, self._pool.array(name, values.shape[::-1]))
 
     def _summed(self, values: np.ndarray) -> np.ndarray:
-        """Sums of values (T, n) over each group, (T, groups)."""
+        """Return the sums of values (T, n) over each group, (T, groups)."""
         order, starts = self._scene.by_group
         return np.add.reduceat(values[:, order], starts, axis=1) if len(starts) else values
 
@@ -200,16 +202,16 @@ class Buffers:
             batches.append(self._tables["joints"].batch(self._qpos_time[: self._frames], cells))
         if self._widths:
             arms = self._history.moment_arms(self._frames)
-            room = self._room.array("moment_arm", (arms.size,))
+            memory = self._pool.array("moment_arm", (arms.size,))
             batches.append(
-                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, room))
+                self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, memory))
             )
         colors = columns.activation_colors(self._history.states(self._rows)["activation"][rows])
         history, frames = self._history, self._frames
         drawn = (
-            history.polylines(frames, self._room),
-            history.contacts(frames, self._room),
-            history.arrows(frames, self._force_scale or 1.0, self._room),
+            history.polylines(frames, self._pool),
+            history.contacts(frames, self._pool),
+            history.arrows(frames, self._force_scale or 1.0, self._pool),
         )
         cells = columns.path_columns(*drawn, colors)
         batches.append(self._tables["paths"].batch(times, cells))

@@ -1,4 +1,4 @@
-"""Groups of muscles in a recording, given or by the body that they move, and the joints that they cross."""
+"""Groups of muscles in a recording, given or formed by the body that they move, and the joints that they cross."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mjwrap.errors import RecordingError
 from mjwrap.model.couplings import read_couplings
 from mjwrap.model.kinematic_tree import crossed_dofs
 
-MOST, LEAST = 12, 4  # groups that are made where none are given, and muscles in each but the last
+MOST, LEAST = 12, 4  # numbers of groups, and of muscles in each but the last, if no groups are given
 OTHERS = "others"
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 _AXES = {FREE: ("x", "y", "z", "rx", "ry", "rz"), BALL: ("rx", "ry", "rz")}
@@ -24,7 +24,7 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Group:
-    """Muscles, by their numbers, that have their curves together."""
+    """Muscles, by their indices, whose curves are shown together."""
 
     name: str
     members: list[int]
@@ -34,8 +34,8 @@ class Group:
 class Coordinate:
     """A joint, or one axis of it, and the muscles that cross it.
 
-    turns: whether it is an angle; follows: whether an equality moves it with another joint; qpos: where its value is,
-    -1 for an axis of a ball or free joint, which has none.
+    turns: whether it is an angle; follows: whether an equality moves it with another joint; qpos: index of its value,
+    -1 for an axis of a ball or free joint, which has no value of its own.
     """
 
     name: str
@@ -47,9 +47,9 @@ class Coordinate:
 
 
 def given_groups(wanted: Mapping[str, str | Iterable[str]], muscles: Sequence[str]) -> list[Group]:
-    """Groups from patterns of muscle names (* and ? stand for anything); the rest are `others`.
+    """Return groups from patterns of muscle names (* and ? match any characters); the remaining muscles are `others`.
 
-    RecordingError where a pattern finds no muscle, or two groups the same one.
+    Raises RecordingError if a pattern matches no muscle, or a muscle is in two groups.
     """
     owner: dict[int, str] = {}
     for name, patterns in wanted.items():
@@ -69,10 +69,10 @@ def given_groups(wanted: Mapping[str, str | Iterable[str]], muscles: Sequence[st
 
 
 def moved_groups(model: Any, declarations: Sequence[Any], body_names: Sequence[str]) -> list[Group]:
-    """At most `MOST` groups, each named after the body that its muscles, or those of bodies beyond it, move.
+    """Return at most `MOST` groups, each named after the body that its muscles move, or after a body above that.
 
-    A muscle moves the body of its two ends that has more joints between it and the world. The smallest groups are
-    joined with those of the next body towards the world until there are few enough.
+    A muscle moves that body of its two ends that has more joints between it and the world. The smallest groups are
+    merged into those of the next body towards the world until there are few enough.
     """
     depth = np.zeros(model.nbody, dtype=np.int64)
     for body in range(1, model.nbody):
@@ -95,7 +95,7 @@ def moved_groups(model: Any, declarations: Sequence[Any], body_names: Sequence[s
 
 
 def _owners(model: Any, counts: Ints, least: int) -> Ints:
-    """For each body the one, on its way to the world, with which it forms a group of at least `least` muscles."""
+    """Return for each body the body, on the way to the world, whose group it joins: one of at least `least` muscles."""
     total = counts.copy()
     merged = np.zeros(model.nbody, dtype=np.bool_)
     for body in range(model.nbody - 1, 0, -1):  # children have higher numbers
@@ -112,7 +112,7 @@ def _owners(model: Any, counts: Ints, least: int) -> Ints:
 def crossed_coordinates(
     model: Any, declarations: Sequence[Any], joint_names: Sequence[str]
 ) -> list[Coordinate]:
-    """Every coordinate that some muscle crosses, see `crossed_dofs`."""
+    """Return every coordinate that a muscle crosses; see `crossed_dofs`."""
     crossing = crossed_dofs(model, declarations)
     followers = {coupling.joint for coupling in read_couplings(model)}
     found = []

@@ -1,4 +1,4 @@
-"""Existing recordings: a summary of the contents, and the viewer."""
+"""Summarise a recording, and show it in the viewer."""
 
 import contextlib
 import os
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 _HERE = "127.0.0.1"
-_PATIENCE = 60.0  # seconds until a server has to listen
+_PATIENCE = 60.0  # seconds within which a server must listen
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a recording holds; times in simulated seconds, nan where no state was logged."""
+    """The contents of a recording; times in simulated seconds, nan if no state was logged."""
 
     path: Path
     model: str
@@ -39,9 +39,9 @@ class Summary:
 
 
 def read_summary(path: str | os.PathLike[str]) -> Summary:
-    """Read what a recording holds.
+    """Read the contents of a recording.
 
-    Raises RecordingError where there is no such file, it is cut short or damaged, or `Recorder` did not write it.
+    Raises RecordingError if the file does not exist, is incomplete or damaged, or was not written by `Recorder`.
     """
     path = Path(path)
     if not path.is_file():
@@ -62,7 +62,7 @@ def read_summary(path: str | os.PathLike[str]) -> Summary:
             if not ours:
                 raise RecordingError(f"'{path}' is a rerun file, but not a recording of {APPLICATION}")
             store = _indexed(reader, ours[0])
-        # every chunk is decoded, so that damage anywhere shows
+        # every chunk is decoded, so that any damage is found
         properties, times = {}, {}
         for chunk in store.stream():
             columns = chunk.to_record_batch()
@@ -83,15 +83,15 @@ def read_summary(path: str | os.PathLike[str]) -> Summary:
 
 
 def _indexed(reader: "RrdReader", entry: "StoreEntry") -> "LazyStore":
-    """The store of a recording; RecordingError where the table of contents, written last, is missing."""
+    """Return the store of a recording; RecordingError if the table of contents, which is written last, is missing."""
     try:
         return reader.store(store=entry)
     except RuntimeError as error:
-        raise RecordingError(f"'{reader.path}' is cut short: its table of contents is missing") from error
+        raise RecordingError(f"'{reader.path}' is incomplete: its table of contents is missing") from error
 
 
 def open_native(path: str | os.PathLike[str]) -> int:
-    """Open the native viewer on a recording, wait until it is closed and give its exit code."""
+    """Open the native viewer on a recording, wait until it is closed, and return its exit code."""
     process = _viewer([str(path)])
     try:
         return process.wait()
@@ -100,7 +100,7 @@ def open_native(path: str | os.PathLike[str]) -> int:
 
 
 class Server(NamedTuple):
-    """A viewer for browsers: the address to open, where a `Recorder` connects to, and the process that serves."""
+    """A viewer for browsers: the address to open, the address to which a `Recorder` connects, and the process."""
 
     address: str
     connect: str
@@ -108,10 +108,10 @@ class Server(NamedTuple):
 
 
 def serve(path: str | os.PathLike[str] | None = None, port: int = 9090) -> Server:
-    """Serve a recording, or what a `Recorder` sends there, to browsers on this machine; returns once it listens.
+    """Serve a recording, or the data of a connected `Recorder`, to browsers on this machine; returns once it listens.
 
-    The viewer listens at `port`, the data come from `port + 1`. Raises RecordingError where one is taken, or the
-    server does not start.
+    The viewer listens at `port`, the data come from `port + 1`. Raises RecordingError if one of the ports is in use, or
+    the server does not start.
     """
     for number in (port, port + 1):
         try:
@@ -121,7 +121,7 @@ def serve(path: str | os.PathLike[str] | None = None, port: int = 9090) -> Serve
         except (OSError, OverflowError) as error:
             raise RecordingError(f"cannot serve at port {number}: {error}; choose another port") from error
     connect = f"rerun+http://{_HERE}:{port + 1}/proxy"
-    # the server keeps what it hands out in memory, and drops the oldest beyond its limit
+    # the server keeps the data in memory, and drops the oldest beyond its limit
     limits = ["--bind", _HERE, "--server-memory-limit", "75%"]
     ports = ["--web-viewer-port", str(port), "--port", str(port + 1)]
     process = _viewer([*([] if path is None else [str(path)]), "--serve-web", *limits, *ports])
@@ -149,10 +149,10 @@ def _wait_for(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 class _Viewer(subprocess.Popen[bytes]):
-    """The viewer's launcher, which does not hand signals on to the viewer that it starts: so end both."""
+    """The viewer's launcher; it does not pass signals to the viewer that it starts, so both must be ended."""
 
     def terminate(self) -> None:
-        """End the launcher and its viewer."""
+        """End the launcher and the viewer."""
         if os.name == "posix":
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self.pid, signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""`Recorder`: writes a run into a file that the rerun viewer plays."""
+"""`Recorder`: records a run into a file for the rerun viewer, or streams it to a viewer."""
 
 import math
 import numbers
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from mjwrap.system.results import Results
 
 SUFFIX = ".rrd"
-BUFFERED = 80_000  # states of a muscle that are gathered unless the caller says otherwise; some 50 MB
-LIVE = 0.2  # seconds by the clock between two batches to a running viewer
+BUFFERED = 80_000  # default number of states to collect times the number of muscles; about 50 MB
+LIVE = 0.2  # wall-clock seconds between two batches to a running viewer
 
 
 class Recorder(RunLog):
@@ -28,23 +28,23 @@ class Recorder(RunLog):
 
     The curves are length [m], lengthening speed [m/s], tension [N], activation, power [W], fibre length [m], solver
     status and iterations of every muscle. The file gets its name only when it is complete: at `close`, or at the end
-    of a `with` block, also if Ctrl-C ended it. After an error inside the block no file is left, and an existing file
-    of that name stays as it was.
+    of a `with` block, also after Ctrl-C. After an error inside the block no file is left, and an existing file of that
+    name is unchanged.
 
     Args:
         model: a mujoco.MjModel.
-        muscles: its MuscleSystem, or `mjwrap.plugin.Muscles` of the data that a model with the engine plugin moves.
+        muscles: its MuscleSystem or, for a model with the engine plugin, the `mjwrap.plugin.Muscles` of its data.
         path: a file name that ends in .rrd; None with `connect`.
-        connect: stream to a running viewer, besides the file or instead of it: True for one on this machine, or an
+        connect: stream to a running viewer, in addition to the file or without one: True for this machine, or an
             address (rerun+http://HOST:PORT/proxy).
-        rate: states per second of simulated time in the curves [Hz], besides those of frames; None for one at every
+        rate: states per second of simulated time in the curves [Hz], in addition to those of frames; None: one at every
             `log`.
-        path_rate: frames per second of simulated time [Hz] of bodies, paths, contact points, forces and moment arms.
-        groups: whose curves are shown together, {name: patterns of muscle names}; None to group muscles by the body
+        path_rate: frames of bodies, paths, contact points, forces and moment arms per second of simulated time [Hz].
+        groups: muscles whose curves are shown together, {name: patterns of names}; None to group muscles by the body
             that they move.
-        force_scale: length of an arrow [m/N]; None: the strongest muscle's is three tenths of the size of all paths.
-        flush_every: states that are gathered before they go to the file; None for 4000, fewer with many muscles.
-        spacing: largest distance of points on the curved parts of a path [m]; None to choose it from the curvature.
+        force_scale: length of an arrow [m/N]; None: the strongest muscle's is 0.3 times the size of all paths.
+        flush_every: number of states collected before they are written; None for 4000, fewer with many muscles.
+        spacing: largest distance of points on the curved parts of a path [m]; None: chosen by the curvature.
 
     Raises:
         RecordingError: before the run, if the file cannot be written or no viewer listens; from `log` or `close`, if
@@ -73,7 +73,7 @@ class Recorder(RunLog):
         require("flush_every", flush_every, whole, "a whole number, at least 1")
         require("spacing", spacing, spacing is None or is_positive(spacing), "a positive length in metres")
         if path is None and not connect:
-            raise RecordingError("there is nowhere to record to: give a file name, or connect=True, or both")
+            raise RecordingError("a recording needs a file name, or connect=True, or both")
         target = None if path is None else PartFile(path, SUFFIX)
         self._live, self._batch_due = bool(connect), -math.inf
         try:
@@ -88,10 +88,10 @@ class Recorder(RunLog):
         self._begin(str(connect if target is None else target.path), target, self._stream.abandon)
 
     def log(self, data: Any) -> None:
-        """Record the state that `muscles` last saw, where one is due; `data` is the mujoco.MjData that it belongs to.
+        """Record the state of the muscles' last evaluation, if a row is due; data: its mujoco.MjData.
 
-        Raises RecordingError where the disk is full, where time runs backwards (after a reset: one recording
-        is one run), and after `close`.
+        Raises RecordingError if the disk is full, if time goes backwards (a recording has one run; make another one
+        after a reset), and after `close`.
         """
         if self._ended:
             raise RecordingError(f"cannot log to '{self._place}': {self._ended}")
@@ -129,7 +129,7 @@ def _open(
     rows: int,
     how: tuple[float | None, float, float | None, float | None],
 ) -> tuple["Buffers", "Stream"]:
-    """Make room for so many rows and start the file or the connection; rerun loads here and nowhere earlier.
+    """Allocate the buffers and open the file or the connection; rerun is loaded here, not earlier.
 
     how: the fields of `frames.Options`.
     """

@@ -1,4 +1,4 @@
-"""Names and static contents of a recording: the entities of bodies, geoms, sites and muscles."""
+"""The names and the static contents of a recording: entities of bodies, geoms, sites and muscles."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -11,14 +11,26 @@ from mjwrap.recording.groups import Group, crossed_coordinates, given_groups, mo
 from mjwrap.recording.static_shapes import draws, geom_shape, pose, surface_shape
 from mjwrap.recording.stream import Stream
 
-MEASURED = ("length", "velocity", "tension", "activation", "status", "iterations")  # of every muscle
-FIBER = "fiber_length"  # where some muscle has fibres
-SUMMED = {"activation": "mean", "tension": "sum", "power": "sum", "without_path": "number"}  # over a group
+MEASURED = (
+    "length",
+    "velocity",
+    "tension",
+    "activation",
+    "status",
+    "iterations",
+)  # quantities of every muscle
+FIBER = "fiber_length"  # if a muscle has fibres
+SUMMED = {
+    "activation": "mean",
+    "tension": "sum",
+    "power": "sum",
+    "without_path": "number",
+}  # sums and means of a group
 
 SITE_COLORS = {"origins": (60, 200, 90), "insertions": (250, 160, 40), "via_points": (235, 235, 235)}
 CONTACT_COLOR = (250, 230, 60)
 FORCE_COLOR = (80, 220, 220)
-# hues that stay apart on black and on white: eight for the muscles of a page, four more for groups
+# colours that can be distinguished on black and on white: eight for a page's muscles, four more for groups
 SERIES_COLORS = np.array(
     [
         (31, 119, 180), (255, 127, 14), (44, 160, 44), (214, 39, 40),
@@ -28,13 +40,13 @@ SERIES_COLORS = np.array(
     dtype=np.uint8,
 )  # fmt: skip
 PAGE = 8  # muscles whose curves are shown together
-CROWDED = 40  # muscles from which lines and points are drawn thinner
-STRONGEST = 1e6  # a muscle beyond that [N] has no strength that says anything
+CROWDED = 40  # number of muscles from which lines and points are thinner
+STRONGEST = 1e6  # a larger strength [N] is not realistic and is not used
 VISIBLE_GROUPS = 3  # MuJoCo's viewer shows geom groups 0 to 2; later ones hold collision shapes
 
 
 class Scene:
-    """Entity paths of everything in `model` that the recording shows."""
+    """The entity paths of everything in `model` that the recording shows."""
 
     def __init__(
         self, model: Any, muscles: Any, groups: Mapping[str, str | Iterable[str]] | None = None
@@ -57,11 +69,11 @@ class Scene:
         self.groups = self._grouped(body_names, groups)
         self.group_series = {q: [entity("groups", q, group.name) for group in self.groups] for q in SUMMED}
         self.group_sizes = np.array([len(group.members) for group in self.groups], dtype=np.int64)
-        # the muscles in the order of the groups, and where each group begins
+        # the muscles in the order of the groups, and the first of each group
         order = [i for group in self.groups for i in group.members]
         self.by_group = np.array(order, dtype=np.int64), np.cumsum([0, *self.group_sizes])[:-1]
         self.pages = [_pages(group) for group in self.groups]
-        # each muscle's colour: that of its place in its page
+        # each muscle's colour, given by its place in its page
         self.colors = np.empty((len(self.muscle_names), 3), dtype=np.uint8)
         for page in (page for pages in self.pages for page in pages):
             self.colors[page] = SERIES_COLORS[: len(page)]
@@ -95,7 +107,7 @@ class Scene:
     def _grouped(
         self, body_names: list[str], groups: Mapping[str, str | Iterable[str]] | None
     ) -> list[Group]:
-        """The groups that were asked for, or one of all muscles that fit a page, or by the body they move."""
+        """Return the given groups; else one group if all muscles fit on a page; else groups by the body they move."""
         if groups is not None:
             return given_groups(groups, self.muscle_names)
         if len(self.muscle_names) <= PAGE:
@@ -103,7 +115,7 @@ class Scene:
         return moved_groups(self.model, self.declarations, body_names)
 
     def log_static(self, stream: Stream) -> None:
-        """Log geoms, muscle sites and the looks of lines, points and curves."""
+        """Log geoms, muscle sites, and the style of lines, points and curves."""
         stream.static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         model = self.model
         for geom, path in enumerate(self.geoms):
@@ -143,11 +155,11 @@ class Scene:
             stream.static(self.bodies[body], pose(positions[body], quaternions[body]))
 
     def _radius(self, points: float) -> Any:
-        """A radius on the screen [points], halved where there are many muscles."""
+        """Return a radius on the screen [points], halved if there are many muscles."""
         return rr.Radius.ui_points(points if len(self.muscle_names) < CROWDED else 0.5 * points)
 
     def _site_points(self) -> dict[str, rr.Points3D]:
-        """Origins, insertions and via points, fixed in their bodies, labelled with the muscles they belong to."""
+        """Log origins, insertions and via points, fixed in their bodies and labelled with their muscles."""
         where: defaultdict[tuple[str, int], defaultdict[int, list[str]]] = defaultdict(
             lambda: defaultdict(list)
         )
@@ -172,23 +184,23 @@ def _curves(names: list[str], colors: np.ndarray) -> rr.SeriesLines:
 
 
 def _pages(group: Group) -> list[list[int]]:
-    """The muscles of a group, spread evenly over pages."""
+    """Return the muscles of a group, spread evenly over pages."""
     parts = np.array_split(group.members, -(-len(group.members) // PAGE))
     return [[int(i) for i in part] for part in parts]
 
 
 def entity(*parts: str) -> str:
-    """An entity path of `parts`, each with its special characters escaped."""
+    """Return the entity path of `parts`, with special characters escaped."""
     return rr.new_entity_path(list(parts)).lstrip("/")
 
 
 def model_name(model: Any) -> str:
-    """The name in the `<mujoco model="...">` element."""
+    """Return the name in the element `<mujoco model="...">`."""
     return model.names.split(b"\0", 1)[0].decode()
 
 
 def _moves(model: Any, body: int) -> bool:
-    """Whether anything can move a body: a joint above it, or a mocap pose."""
+    """Return whether a body can move: by a joint above it, or by a mocap pose."""
     return model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0
 
 
@@ -197,7 +209,7 @@ def _route_sites(muscle: Any) -> list[int]:
 
 
 def _distinct(names: list[str], kind: str) -> list[str]:
-    """Give every element a name of its own: nameless ones get their number, repeated ones too."""
+    """Return unique names: elements without a name, or with a repeated name, get their number."""
     taken: set[str] = set()
     for i, name in enumerate(names):
         if not name or name in taken:

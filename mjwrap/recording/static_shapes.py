@@ -8,19 +8,19 @@ import rerun as rr
 from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
 from mjwrap.surfaces.triangles import surface_grid, triangles
 
-# mjtGeom; only mjcf, system and plugin know mujoco itself
+# mjtGeom; this package does not import mujoco
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
 
 DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
 WRAP_ALPHA = 0.35
 SMOOTH = 49  # points on the circles of a surface
-FLOOR = 0.2  # brightness of a plane, which without its texture would outshine everything
+FLOOR = 0.2  # brightness of a plane, which would be too bright without its texture
 
 
 def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
-    """The shape of a geom in its own frame, or None for a kind that has no shape.
+    """Return the shape of a geom in its own frame, or None for a kind without a shape.
 
-    Infinite wrapping cylinders are drawn with the half length that the geom has; wrapping surfaces are translucent.
+    Infinite wrapping cylinders are drawn with the geom's half length; wrapping surfaces are translucent.
     """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     rgba = _rgba(model, geom)
@@ -57,7 +57,7 @@ def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
 
 
 def draws(model: Any, geom: int, surface: Surface) -> bool:
-    """Whether a geom is drawn as a surface looks, but for the ends of a cylinder without any."""
+    """Return whether a geom has the shape of a surface; the ends of an infinite cylinder do not count."""
     kind, size = int(model.geom_type[geom]), tuple(float(x) for x in model.geom_size[geom])
     if isinstance(surface, Cylinder):
         return kind == CYLINDER and surface.radius == size[0] and surface.half_length in (size[1], np.inf)
@@ -69,19 +69,19 @@ def draws(model: Any, geom: int, surface: Surface) -> bool:
 
 
 def surface_shape(model: Any, geom: int, surface: Surface) -> rr.AsComponents:
-    """A surface in the frame of the geom that carries it, in the geom's colour, translucent however the geom looks."""
+    """Return the shape of a surface in the frame of its geom, in the geom's colour and translucent."""
     rgba = _rgba(model, geom)
     rgba[3] = WRAP_ALPHA
     return _mesh(*triangles(surface_grid(surface, SMOOTH, SMOOTH)), rgba)
 
 
 def pose(position: np.ndarray, quaternion: np.ndarray) -> rr.Transform3D:
-    """A transform from a position (3,) [m] and a quaternion (4,) w-x-y-z."""
+    """Return a transform from a position (3,) [m] and a quaternion (4,) w-x-y-z."""
     return rr.Transform3D(translation=position, quaternion=rr.Quaternion(xyzw=quaternion[[1, 2, 3, 0]]))
 
 
 def _rgba(model: Any, geom: int) -> np.ndarray:
-    """The colour (4,) that MuJoCo draws a geom with: its own, or its material's where it has none."""
+    """Return the colour (4,) in which MuJoCo draws a geom: its own or, if it has none, that of its material."""
     rgba, material = model.geom_rgba[geom], int(model.geom_matid[geom])
     if material >= 0 and np.allclose(rgba, DEFAULT_RGBA):
         rgba = model.mat_rgba[material]
@@ -89,7 +89,7 @@ def _rgba(model: Any, geom: int) -> np.ndarray:
 
 
 def _mesh(vertices: np.ndarray, faces: np.ndarray, rgba: np.ndarray) -> rr.Mesh3D:
-    """A mesh of one colour, with normals averaged over the faces around each vertex, by area."""
+    """Return a mesh of one colour, with normals averaged by area over the faces around each vertex."""
     vertices = np.asarray(vertices, dtype=np.float32)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.zeros_like(vertices)
@@ -103,7 +103,7 @@ def _mesh(vertices: np.ndarray, faces: np.ndarray, rgba: np.ndarray) -> rr.Mesh3
 
 
 def _hfield(model: Any, field: int) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (rows columns, 3) and faces (m, 3) of a height field's upper side."""
+    """Return vertices (rows columns, 3) and faces (m, 3) of a height field's upper side."""
     rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
     start = int(model.hfield_adr[field])
     half_x, half_y, height, _ = model.hfield_size[field]

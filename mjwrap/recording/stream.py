@@ -1,4 +1,4 @@
-"""One recording stream of rerun, into a file or to a running viewer, with errors that are raised."""
+"""A recording stream of rerun, to a file or to a running viewer, whose errors are raised."""
 
 import socket
 import warnings
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     import rerun.blueprint as rrb
 
 APPLICATION = "mjwrap"
-VIEWER = "rerun+http://127.0.0.1:9876/proxy"  # where a viewer listens unless it is told otherwise
+VIEWER = "rerun+http://127.0.0.1:9876/proxy"  # default address of a viewer
 
 
 class Stream:
     """A recording stream into a `PartFile`, to the viewer at an address, or both.
 
-    `send`, `wait` and `finish` raise RecordingError where the file cannot grow, or where the viewer is gone and there
-    is no file; beside a file, a viewer that goes away is a warning.
+    `send`, `wait` and `finish` raise RecordingError if the file cannot grow, or if the viewer is gone and there is no
+    file. If there is a file, they warn of a viewer that is gone.
     """
 
     def __init__(self, target: PartFile | None, url: str | None, name: str) -> None:
@@ -49,7 +49,7 @@ class Stream:
         rr.send_recording_name(name, recording=self._recording)
 
     def static(self, entity: str, *archetypes: rr.AsComponents) -> None:
-        """Log what holds for the whole recording."""
+        """Log data that hold for the whole recording."""
         self._recording.log(entity, *archetypes, static=True, strict=True)
 
     def properties(self, **values: str | float | list[str]) -> None:
@@ -57,19 +57,19 @@ class Stream:
         rr.send_property(APPLICATION, rr.AnyValues(True, **values), recording=self._recording)
 
     def blueprint(self, blueprint: "rrb.Blueprint") -> None:
-        """Send the layout that the viewer opens with."""
+        """Send the initial layout of the viewer."""
         self._recording.send_blueprint(blueprint)
 
     def send(self, batches: list[pa.RecordBatch]) -> None:
-        """Hand columns to the writer, which works while the simulation runs on; `wait` comes before."""
+        """Pass columns to the writer, which works while the simulation continues; call `wait` before."""
         for batch in batches:
-            if batch.num_columns > 1:  # a model without muscles, or without bodies, has times alone
+            if batch.num_columns > 1:  # a model without muscles, or without bodies, has only times
                 rr.send_record_batch(batch, recording=self._recording)
 
     def wait(self) -> bool:
-        """Return once everything sent is on its way to the file, or with the viewer, and whether that is certain.
+        """Wait until all that was sent is on its way to the file or with the viewer; return whether that is certain.
 
-        So a full disk shows after at most one batch. Where a viewer goes away beside a file it is not certain.
+        So a full disk is noticed after at most one batch. It is not certain if there is a file and the viewer is gone.
         """
         try:
             self._recording.flush()
@@ -83,7 +83,7 @@ class Stream:
         return True
 
     def finish(self) -> None:
-        """Write the table of contents of a file, close it and read that table back."""
+        """Write the table of contents of a file, close the file, and read the table back."""
         self.wait()
         self._disconnect()
         self._check()
@@ -97,7 +97,7 @@ class Stream:
             raise self._failure(error) from error
 
     def abandon(self) -> None:
-        """Close the file, complete or not."""
+        """Close the file, even if it is incomplete."""
         self._disconnect()
 
     def _disconnect(self) -> None:
@@ -120,14 +120,14 @@ class Stream:
         if not self._lost:
             self._lost = True
             warnings.warn(
-                f"the viewer at {self._url} is gone; the recording to '{self._target.path}' goes on",
+                f"the viewer at {self._url} is gone; the recording to '{self._target.path}' continues",
                 RuntimeWarning,
                 stacklevel=2,
             )
 
 
 def _require_viewer(url: str) -> None:
-    """Raise RecordingError where nothing listens at an address: rerun itself would wait for it."""
+    """Raise RecordingError if no viewer listens at an address: rerun itself would wait for one."""
     try:
         parts = urlsplit(url)
         if not (parts.scheme in ("rerun+http", "rerun+https") and parts.hostname and parts.path == "/proxy"):

@@ -1,4 +1,4 @@
-"""Writing a recording into its file, with errors when the disk is full."""
+"""Write a recording to its file, with an error if the disk is full."""
 
 import os
 import selectors
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 class FilePipe:
-    """A pipe that rerun writes into, and a thread that carries what arrives there into a file.
+    """A pipe into which rerun writes, and a thread that copies the data to a file.
 
-    rerun's own file writer says only in its log that the disk is full, and can then wait for itself for ever. Here
-    it never meets a full disk: after an error the thread goes on emptying the pipe, and `error` tells.
+    rerun's own file writer reports a full disk only in its log, and can then wait for ever. With the pipe it never
+    meets a full disk: after an error, which is kept in `error`, the thread continues to empty the pipe.
     """
 
     AVAILABLE = Path("/dev/fd").is_dir()
@@ -27,13 +27,13 @@ class FilePipe:
         self._carrier.start()
 
     def connected(self) -> None:
-        """Leave the entrance to the writer that has opened `address`."""
+        """Close this end of the pipe: the writer that has opened `address` has its own."""
         os.close(self._entrance)
 
     def finish(self) -> None:
-        """Return once all that a writer, now closed, has written is on the disk, or `error` says why not.
+        """Wait until all data of a writer that is now closed are on the disk, or `error` says why not.
 
-        A process forked meanwhile may hold the entrance open for ever, so its closing is not waited for.
+        A process forked meanwhile may keep the pipe open for ever, so this does not wait for the end of the pipe.
         """
         if not self._finished:
             self._finished = True
@@ -46,7 +46,7 @@ class FilePipe:
         with selectors.DefaultSelector() as either:
             for end in (self._exit, self._stop_seen):
                 either.register(end, selectors.EVENT_READ)
-            # the stop counts only where nothing is left in the pipe
+            # stop only when the pipe is empty
             while self._exit in (key.fd for key, _ in either.select()):
                 if not (data := os.read(self._exit, 1 << 20)):
                     break

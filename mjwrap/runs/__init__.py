@@ -1,4 +1,4 @@
-"""Running a model from Python: excitation, prescribed motion, the engine, and tables of its states and results.
+"""Run a model from Python: excitation, prescribed motion, the engine, and tables of states and results.
 
 `simulate` runs a model and returns a table; `Simulation` gives access to the model, its muscles and every sample.
 """

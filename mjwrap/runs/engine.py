@@ -1,4 +1,4 @@
-"""The engine of a run: `MuscleSystem` step by step, or the engine plugin inside MuJoCo."""
+"""The engine of a run: a `MuscleSystem` that is stepped, or the engine plugin inside MuJoCo."""
 
 from __future__ import annotations
 
@@ -18,50 +18,50 @@ MODES = ("python", "wrench", "transmission")
 
 
 class Engine(Protocol):
-    """A model in motion. `data` is what moves; `seen` and `muscles` are what a sample is read from, after `look`."""
+    """A model in motion. `data` moves; after `evaluate` a sample is read from `sampled` and `muscles`."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    seen: mujoco.MjData
+    sampled: mujoco.MjData
     muscles: MuscleSystem
 
     def step(self) -> None:
-        """Advance by one time step; `StateError` where the motion becomes unstable."""
+        """Advance by one time step; `StateError` if the motion becomes unstable."""
         ...
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate the muscles at the present state."""
         ...
 
     def failures(self) -> dict[str, str]:
-        """Return, by muscle, on how many steps it had no path, and why at last."""
+        """Return, by muscle, the number of steps without a path, and the last reason."""
         ...
 
 
 class PythonEngine:
-    """`MuscleSystem` reads and writes the mjData."""
+    """A `MuscleSystem` that is stepped."""
 
     def __init__(self, source: str, strict: bool) -> None:
         self.model = load(source)
         self.muscles = MuscleSystem(self.model, strict=strict)
-        self.data = self.seen = mujoco.MjData(self.model)
+        self.data = self.sampled = mujoco.MjData(self.model)
 
     def step(self) -> None:
         """Advance by one time step."""
         self.muscles.step(self.data)
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate the muscles at the present state."""
         self.muscles.forward(self.data)
 
     def failures(self) -> dict[str, str]:
-        """Return, by muscle, on how many steps it had no path, and why at last."""
+        """Return, by muscle, the number of steps without a path, and the last reason."""
         lines = self.muscles.report().splitlines()
         return dict(line.split(": ", 1) for line in lines)
 
 
 class PluginEngine:
-    """Plain mj_step with the muscles inside MuJoCo; a MuscleSystem on a second model is there to be looked at."""
+    """Plain `mj_step` with the muscles in the engine plugin; a MuscleSystem on a second model computes the samples."""
 
     def __init__(self, source: str, mode: str, strict: bool) -> None:
         from mjwrap.plugin import excitations, install, read
@@ -70,15 +70,15 @@ class PluginEngine:
         self.model = install(load_spec(source), mode)
         self.data = mujoco.MjData(self.model)
         self.muscles = MuscleSystem(load(source))
-        self.seen = mujoco.MjData(self.muscles.model)
+        self.sampled = mujoco.MjData(self.muscles.model)
         self._strict = strict
         self._excitations = excitations(self.data)
         self._copy = mujoco.MjData(self.model)
-        # muscles without an actuator: their states are the plugin's
+        # of muscles without an actuator, whose states the plugin keeps
         self._own = [i for i, muscle in enumerate(self.muscles.declarations) if muscle.actuator < 0]
 
     def fresh(self) -> mujoco.MjData:
-        """Return a copy in which all is computed at the present state, so that the run stays as it is."""
+        """Return a copy of the data with everything computed at the present state; the run is not changed."""
         mujoco.mj_copyData(self._copy, self.model, self.data)
         mujoco.mj_forward(self.model, self._copy)
         return self._copy
@@ -98,21 +98,21 @@ class PluginEngine:
             for name, why in self.failures().items():
                 raise PathError(f"muscle '{name}' at time {self.data.time:g} s: {why}")
 
-    def look(self) -> None:
-        """Take the state over and evaluate the muscles there."""
-        seen, data = self.seen, self.data
-        seen.time = data.time
+    def evaluate(self) -> None:
+        """Copy the state to the second model and evaluate the muscles there."""
+        sampled, data = self.sampled, self.data
+        sampled.time = data.time
         for name in ("qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat"):
-            getattr(seen, name)[:] = getattr(data, name)
+            getattr(sampled, name)[:] = getattr(data, name)
         if self._own:
             held = self._read(self.fresh())
             places = {i: held.names.index(self.muscles.names[i]) for i in self._own}
             own = {i: (float(held.activation[k]), float(held.fiber_length[k])) for i, k in places.items()}
-            put_own(self.muscles, seen, own)
-        self.muscles.forward(seen)
+            put_own(self.muscles, sampled, own)
+        self.muscles.forward(sampled)
 
     def failures(self) -> dict[str, str]:
-        """Return, by muscle, on how many steps it had no path, and why, where that is so now."""
+        """Return, by muscle, the number of steps without a path, and the reason if it has none now."""
         held = self._read(self.data)
         found = {}
         for name, count, code in zip(held.names, held.failures.tolist(), held.status.tolist(), strict=True):
@@ -123,7 +123,7 @@ class PluginEngine:
 
 
 def start_engine(source: str, mode: str, strict: bool) -> Engine:
-    """Return the engine for a model (a file, or "myo_sim:NAME") in one of `MODES`.
+    """Return the engine of a model (a file, or "myo_sim:NAME") for a mode of `MODES`.
 
     "python" is `MuscleSystem`; the others are modes of the plugin's `install`. strict: raise `PathError` at the first
     step at which a muscle has no path.

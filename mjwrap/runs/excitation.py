@@ -1,4 +1,4 @@
-"""Excitation of muscles and actuators by signals, which are given as patterns or as tables."""
+"""Excitation of muscles and actuators by signals, given as patterns or tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mjwrap.system import MuscleSystem
 
 
 def control_names(model: Any) -> list[str]:
-    """Return a name for every entry of ctrl: its actuator's, with a number where the actuator has several controls."""
+    """Return a name for every entry of ctrl: its actuator's, with a number if the actuator has several controls."""
     found: list[str] = []
     for i in range(model.nactuator):
         name, count = model.actuator(i).name or f"#{i}", int(model.actuator_ctrlnum[i])
@@ -25,11 +25,18 @@ def control_names(model: Any) -> list[str]:
 class Excitation:
     """Signals for the muscles and other actuators of a model.
 
-    entries: in order, a later one wins: a pattern ("sine:0.3,1,0.4") for all muscles; NAME=PATTERN for the muscles and
-    actuators whose names match NAME (`*` and `?` stand for anything); or the name of a table (.csv, .sto, .mot, .npz)
-    with a column for each muscle or actuator that it drives (`match_columns`). seed: for the pattern `random`. What no
-    entry names keeps its control. `SignalError` for an entry that cannot be understood or that names nothing in the
-    model.
+    Actuators that no entry names keep their control.
+
+    Args:
+        muscles: the muscles.
+        entries: patterns and tables; a later entry overrides earlier ones. A pattern ("sine:0.3,1,0.4") is for all
+            muscles; NAME=PATTERN for the muscles and actuators whose names match NAME (`*` and `?` match any
+            characters); the name of a table (.csv, .sto, .mot, .npz) for the muscles and actuators that its columns
+            name (`match_columns`).
+        seed: seed of the pattern `random`.
+
+    Raises:
+        SignalError: an entry is not valid, or matches no muscle or actuator.
     """
 
     def __init__(self, muscles: MuscleSystem, entries: Sequence[str], seed: int = 0) -> None:
@@ -51,11 +58,11 @@ class Excitation:
 
     @property
     def names(self) -> list[str]:
-        """Names of everything that can be driven: actuators, then muscles without one."""
+        """Names of everything that can be driven: actuators, then muscles without an actuator."""
         return list(self._places)
 
     def _read(self, entry: str) -> None:
-        name, equals, pattern = entry.rpartition("=")  # a name may have one, too
+        name, equals, pattern = entry.rpartition("=")  # the name may contain "=", too
         if equals and not os.path.isfile(entry):
             found = [name] if name in self._places else fnmatch.filter(self.names, name)
             if not found:

@@ -1,4 +1,4 @@
-"""Models by file or name, and the states that runs start from."""
+"""Load models by file or name, and set the states in which runs start."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _MYO = "myo_sim:"
 
 
 def load(source: str) -> mujoco.MjModel:
-    """Load an MJCF or MJB file, or "myo_sim:NAME", a model that the myo-sim package composes; `ModelError`."""
+    """Load an MJCF or MJB file, or "myo_sim:NAME", a model of the myo-sim package; `ModelError` if that fails."""
     return load_spec(source).compile() if source.startswith(_MYO) else read_model(source)
 
 
 def load_spec(source: str) -> mujoco.MjSpec:
-    """Return the spec of an MJCF file or of "myo_sim:NAME"; `ModelError` for an MJB file, which has none."""
+    """Return the spec of an MJCF file or of "myo_sim:NAME"; `ModelError` for an MJB file, which has no spec."""
     if not source.startswith(_MYO):
-        read_model(source)  # says what is wrong with it
+        read_model(source)  # raises an error if the file is wrong
         if source.lower().endswith(".mjb"):
             raise ModelError(f"'{source}' is an MJB file, which cannot be changed; give its XML instead")
         return mujoco.MjSpec.from_file(source)
@@ -46,7 +46,7 @@ def load_spec(source: str) -> mujoco.MjSpec:
 
 
 def start_keyframe(model: mujoco.MjModel, name: str | None) -> int:
-    """Return the id of a keyframe, -1 for None; `ModelError` lists the model's keyframes."""
+    """Return the id of a keyframe, -1 for None; `ModelError`, which lists the keyframes, if there is no such one."""
     if name is None:
         return -1
     known = names(model, mujoco.mjtObj.mjOBJ_KEY, model.nkey)
@@ -58,16 +58,16 @@ def start_keyframe(model: mujoco.MjModel, name: str | None) -> int:
 def start_state(
     model: mujoco.MjModel, key: int, positions: Mapping[str, float] | None = None
 ) -> mujoco.MjData:
-    """Return new data in the state that `set_state` describes."""
+    """Return new data in the state that `set_state` sets."""
     data = mujoco.MjData(model)
     set_state(model, data, key, positions or {})
     return data
 
 
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Mapping[str, float]) -> None:
-    """Reset data to a keyframe (-1: qpos0 stays), then set hinges and slides to positions [rad, m] by name.
+    """Reset data to a keyframe (-1: to qpos0), then set hinges and slides to positions [rad, m] by name.
 
-    Warns of a position outside its joint's range; `ModelError` for a name that is not a hinge or slide.
+    Warns if a position lies outside its joint's range. Raises `ModelError` for a name that is not a hinge or slide.
     """
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
@@ -84,7 +84,7 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: M
 
 
 def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:
-    """Return the id of a hinge or slide; `ModelError` quotes the entry that names it and lists the joints."""
+    """Return the id of a hinge or slide; otherwise `ModelError`, which quotes the entry and lists the joints."""
     fit = single_joints(model)
     if name not in fit:
         raise ModelError(f"'{entry}': no hinge or slide '{name}'; there are: {', '.join(fit) or 'none'}")

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class _Part(NamedTuple):
-    """One file: its output, its writer, and which of the numbers at a sample it takes."""
+    """One file: its output, its writer, and the function that reads its numbers at a sample."""
 
     output: PartFile
     writer: RowWriter
@@ -27,12 +27,12 @@ class _Part(NamedTuple):
 
 
 class MuscleAnalysisTables:
-    """Writes a row into every file for every sample.
+    """Write a row to every file for every sample.
 
     Length, FiberLength (of muscles whose law has fibres) and TendonForce; MomentArm_JOINT, −∂l/∂q, for every degree
     of freedom that a muscle spans, 0 for muscles that do not span it. SI units. The files are called
-    PREFIX_MuscleAnalysis_QUANTITY.sto. open_file: makes the `PartFile` for such a name; `RecordingError` for a place
-    that cannot be written.
+    PREFIX_MuscleAnalysis_QUANTITY.sto. open_file: opens the `PartFile` of such a name. Raises `RecordingError` if a
+    file cannot be written.
     """
 
     def __init__(
@@ -64,14 +64,14 @@ class MuscleAnalysisTables:
         self._parts.append(_Part(output, writer, read))
 
     def log(self, data: mujoco.MjData) -> None:
-        """Write the present state."""
+        """Write the results at the present state."""
         jacobian = self._muscles.length_jacobian(data)
         for part in self._parts:
             with part.output.writing():
                 part.writer.add(data.time, part.read(jacobian))
 
     def close(self) -> None:
-        """Finish the files and give them their names."""
+        """Complete the files and give them their names."""
         for part in self._parts:
             with part.output.writing():
                 part.writer.finish()

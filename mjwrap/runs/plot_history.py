@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
-MOST = 4000  # samples that a plot keeps; every second one goes when there are more
+MOST = 4000  # largest number of samples in a plot; if there are more, every second one is dropped
 
 
 class PlotHistory:
@@ -21,7 +21,7 @@ class PlotHistory:
         self._stride, self._skip = 1, 0
 
     def log(self, data: mujoco.MjData) -> None:
-        """Keep the present state."""
+        """Store the present state."""
         self._skip -= 1
         if self._skip >= 0:
             return

@@ -1,4 +1,4 @@
-"""Joints that follow a given motion, whatever pulls at them; the rest of the model feels that motion."""
+"""Joints that follow a given motion, whatever forces act on them; the rest of the model is moved by them."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from mjwrap.runs.signals import Constant, Sine, SmoothSignal, match_columns, par
 
 Array = NDArray[np.float64]
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-HEAVY = 1e9  # inertia of a prescribed joint, in those of the heaviest one
+HEAVY = 1e9  # inertia of a prescribed joint, relative to the largest inertia in the model
 
 
 class Spline:
-    """A smooth curve through samples; the first and last value are held outside."""
+    """A smooth curve through samples; before the first and after the last one it is constant."""
 
     def __init__(self, times: Array, values: Array) -> None:
         from scipy.interpolate import CubicSpline
 
         self._low, self._high = float(times[0]), float(times[-1])
-        # at rest at both ends, where the value is held from
+        # at rest at both ends, beyond which the value is constant
         self._curve = CubicSpline(times, values, bc_type="clamped") if len(times) > 1 else None
         self._only = float(values[0])
 
@@ -38,7 +38,7 @@ class Spline:
         return float(self._curve(min(max(t, self._low), self._high), order))
 
     def value(self, t: float) -> float:
-        """Return the number at time t."""
+        """Return the value at time t."""
         return self._at(t, 0)
 
     def rate(self, t: float) -> float:
@@ -49,10 +49,15 @@ class Spline:
 class PrescribedMotion:
     """The prescribed joints of a run.
 
-    entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
-    column for each joint. Positions in rad or m, or in degrees where the table's header says so. The joints' armature
-    is changed in `model`. option: what the entries were given by, for messages. `SignalError` or `ModelError` for an
-    entry that cannot be used.
+    Args:
+        model: the model, in which the armature of these joints is changed.
+        entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
+            column for each joint. Positions are in rad or m, or in degrees if the table's header says so.
+        option: name of the command-line option of the entries, for messages.
+
+    Raises:
+        SignalError: an entry is not valid.
+        ModelError: a joint does not exist.
     """
 
     def __init__(self, model: mujoco.MjModel, entries: Sequence[str], *, option: str = "") -> None:
@@ -81,20 +86,20 @@ class PrescribedMotion:
         self._signals = list(found.values())
         self._qpos = np.array([model.jnt_qposadr[j] for j in found], dtype=np.int64)
         self._dofs = np.array([model.jnt_dofadr[j] for j in found], dtype=np.int64)
-        # Joints so heavy that nothing else can turn them: at every stage of the integrator they do as they are told.
+        # So much inertia that no other force moves the joints: they follow the motion at every stage of the integrator.
         self._inertia = HEAVY * float(np.max(model.dof_M0, initial=1e-3))
         model.dof_armature[self._dofs] = self._inertia
 
     def place(self, data: mujoco.MjData) -> None:
-        """Put the joints where they should be at `data.time`, with their speeds."""
+        """Set the joints to their prescribed positions and speeds at `data.time`."""
         if self.joints:
             data.qpos[self._qpos] = [signal.value(data.time) for signal in self._signals]
             data.qvel[self._dofs] = [signal.rate(data.time) for signal in self._signals]
 
     def drive(self, data: mujoco.MjData) -> None:
-        """Apply the joint forces that take the joints through the coming step.
+        """Apply the joint forces that move the joints through the coming step.
 
-        Their accelerations are the mean ones of the step: right to second order in its length.
+        The accelerations are the means over the step, accurate to second order in the time step.
         """
         if self.joints:
             now, h = data.time, self._model.opt.timestep
@@ -112,7 +117,7 @@ def _smooth(name: str, pattern: str) -> SmoothSignal:
 
 
 def check_free(model: mujoco.MjModel, joints: Sequence[int], positions: Mapping[str, float]) -> None:
-    """Raise `SignalError` where a start position [rad, m] is given for a joint (by id) that is prescribed."""
+    """Raise `SignalError` if a start position [rad, m] is given for a prescribed joint."""
     for name, value in positions.items():
         entry = f"{name}={value:g}"
         if find_joint(model, name, entry) in joints:

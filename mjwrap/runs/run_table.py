@@ -1,4 +1,4 @@
-"""The table of a run: its columns, and writing it row by row."""
+"""The table of a run: its columns, and its rows, in memory or in a file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ DEFAULT_KINDS = ("qpos", "qvel", "act", "ctrl", *MUSCLE_KINDS)
 
 
 class Column(NamedTuple):
-    """Numbers of one kind: their names, and where they are found at a sample."""
+    """The columns of one kind: their names, and the function that reads their numbers at a sample."""
 
     names: list[str]
     read: Callable[[mujoco.MjData], Array]
 
 
 def check_kinds(kinds: Iterable[str]) -> list[str]:
-    """Return kinds of numbers, each once; `TableError` for an unknown one lists `KINDS`."""
+    """Return the kinds without repetition; `TableError`, which lists `KINDS`, for an unknown one."""
     found = list(dict.fromkeys(kinds))
     for kind in found:
         if kind not in KINDS:
@@ -41,7 +41,7 @@ def check_kinds(kinds: Iterable[str]) -> list[str]:
 
 
 def columns(model: mujoco.MjModel, muscles: MuscleSystem, kinds: Sequence[str]) -> list[Column]:
-    """Return the columns of some kinds, each called KIND:NAME; SI units, moment arms −∂l/∂q."""
+    """Return the columns of the given kinds, each called KIND:NAME; SI units; moment arms are −∂l/∂q."""
     found = []
     for kind in kinds:
         if kind == "moment_arm":
@@ -67,9 +67,9 @@ def _moment_arms(model: mujoco.MjModel, muscles: MuscleSystem) -> Column:
 
 
 class RunTable:
-    """Collects a row for every sample of a run, in memory.
+    """Collect a row for every sample of a run in memory.
 
-    kinds: of `KINDS`, whose columns `columns` describes. `TableError` for an unknown kind.
+    kinds: names of `KINDS`; the function `columns` gives their columns. Raises `TableError` for an unknown kind.
     """
 
     def __init__(
@@ -80,21 +80,21 @@ class RunTable:
         self._kept: list[tuple[float, Array]] = []
 
     def log(self, data: mujoco.MjData) -> None:
-        """Keep the present state; the muscles must have been evaluated at it."""
+        """Store the present state; the muscles must have been evaluated at it."""
         self._kept.append((float(data.time), self._row(data)))
 
     def _row(self, data: mujoco.MjData) -> Array:
         return np.concatenate([np.empty(0), *(column.read(data) for column in self._columns)])
 
     def table(self) -> Table:
-        """Return what was kept."""
+        """Return the table of all samples so far."""
         times = np.array([time for time, _ in self._kept])
         rows = np.array([row for _, row in self._kept]).reshape(len(times), len(self.names))
         return Table(times, self.names, rows)
 
 
 class RunTableFile(RunTable):
-    """Writes a `RunTable` to a file: text as the run goes on, so that a long run needs no memory; NPZ at the end."""
+    """Write a `RunTable` to a file: text during the run, so that a long run needs no memory; NPZ at the end."""
 
     def __init__(
         self,
@@ -121,7 +121,7 @@ class RunTableFile(RunTable):
             self._writer.add(data.time, row)
 
     def close(self) -> None:
-        """Finish the file and give it its name."""
+        """Complete the file and give it its name."""
         with self._output.writing():
             if self._writer is not None:
                 self._writer.finish()

@@ -1,4 +1,4 @@
-"""Signals over time for excitations, controls and prescribed motion, from patterns such as "sine:0.3,1" or tables."""
+"""Signals over time for excitations, controls and prescribed motion: patterns such as "sine:0.3,1", and tables."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TURN = 2.0 * math.pi
 
 
 class Signal(Protocol):
-    """A number that changes with time."""
+    """A value that changes with time."""
 
     def value(self, t: float) -> float:
-        """Return the number at time t [s]."""
+        """Return the value at time t [s]."""
         ...
 
 
@@ -36,7 +36,7 @@ class SmoothSignal(Signal, Protocol):
 
 @dataclass(frozen=True)
 class Constant:
-    """The same number at all times."""
+    """The same value at all times."""
 
     level: float
 
@@ -77,7 +77,7 @@ class Sine:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Smooth humps of height `peak`, one each `period` [s] and half as long, the first one after `phase` turns."""
+    """Smooth pulses of height `peak`, one per `period` [s] and half as long; the first begins after `phase` turns."""
 
     peak: float
     period: float
@@ -91,7 +91,7 @@ class Pulse:
 
 @dataclass(frozen=True)
 class Wander:
-    """A new level between 0 and 1 every `hold` [s], drawn with `seed` and joined smoothly; the same on every run."""
+    """Random levels between 0 and 1, a new one every `hold` [s], joined smoothly; the same `seed`, the same signal."""
 
     seed: tuple[int, ...]
     hold: float = 0.25
@@ -104,7 +104,7 @@ class Wander:
 
     def _level(self, k: int) -> float:
         digits = ",".join(map(str, (*self.seed, k)))
-        # splitmix64 of a checksum: as good as a generator here, and far cheaper to start anew for every k
+        # splitmix64 of a checksum: random enough here, and much faster than a new generator for every k
         z = (zlib.crc32(digits.encode()) * 0x9E3779B97F4A7C15 + 0x9E3779B97F4A7C15) % 2**64
         z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) % 2**64
         z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) % 2**64
@@ -113,7 +113,7 @@ class Wander:
 
 @dataclass(frozen=True)
 class Samples:
-    """Values at given times: straight lines in between, the first and last value held outside."""
+    """Values at given times, interpolated linearly; constant before the first and after the last time."""
 
     times: Array
     values: Array
@@ -143,8 +143,8 @@ def pattern_forms() -> str:
 def parse_pattern(text: str, seed: int = 0) -> Maker:
     """Return a function (name, index, count) -> `Signal` for a pattern such as "sine:0.3,1,0.5".
 
-    index and count let `pulses` run through all muscles in turn, the name gives every muscle its own `random`. seed:
-    used by `random` without one. `SignalError` names what is wrong and lists the forms.
+    index and count make `pulses` pass through all muscles in turn; the name makes `random` different for each. seed:
+    used by `random` without a seed of its own. Raises `SignalError`, which lists the forms, for a wrong pattern.
     """
     kind, _, rest = text.partition(":")
     if kind not in PATTERNS:
@@ -185,11 +185,11 @@ def _maker(text: str, kind: str, numbers: list[float], seed: int) -> Maker:
 
 
 def match_columns(table: Table, known: Sequence[str], what: str) -> dict[str, str]:
-    """Return the name among `known` that each column of a table drives, by column.
+    """Return, for each column of a table, the name among `known` that it drives.
 
-    A column is called as what it drives; or "ctrl:NAME", as `mjwrap run` writes it, which leaves out the other kinds
-    there; or as OpenSim does, "/forceset/NAME", "NAME.excitation" or "/jointset/JOINT/NAME/value". `SignalError`
-    lists the known names where a column is none of these.
+    A column has this name; or "ctrl:NAME", as in tables of `mjwrap run`, whose columns of other kinds are ignored; or a
+    name as in OpenSim: "/forceset/NAME", "NAME.excitation" or "/jointset/JOINT/NAME/value". Raises `SignalError`, which
+    lists the known names, for any other column.
     """
     own = [column for column in table.names if column.startswith("ctrl:")]
     found = {column: _known(column, known) for column in own or table.names}
@@ -210,7 +210,7 @@ def match_columns(table: Table, known: Sequence[str], what: str) -> dict[str, st
 
 
 def _known(column: str, known: Sequence[str]) -> str:
-    """Return the first of a column's readings that is a known name."""
+    """Return the known name in a column's name; if there is none, the column's name."""
     short = column.removesuffix(".excitation").removesuffix("/excitation").removesuffix("/value")
     readings = (column, column.removeprefix("ctrl:"), short, short.rpartition("/")[2])
     return next((name for name in readings if name in known), column)

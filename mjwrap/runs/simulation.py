@@ -1,4 +1,4 @@
-"""Running a model: its settings, its start, and the loop over time steps."""
+"""Run a model: settings, start, and the loop over time steps."""
 
 from __future__ import annotations
 
@@ -20,18 +20,25 @@ from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
 
-Log = Callable[[mujoco.MjData], object]  # takes the state of a sample
+Log = Callable[[mujoco.MjData], object]  # called with the state of a sample
 
 
 @dataclass(frozen=True)
 class RunSettings:
-    """How a model is run.
+    """The settings of a run.
 
-    duration and sample, the time between samples, rounded to whole time steps [s]. timestep [s] and integrator, a name
-    in `INTEGRATORS`: None leaves the model's. mode: what runs the muscles, one of `MODES`. excitation, seed: as
-    `Excitation` takes them. prescribed: joints that follow a motion, as `PrescribedMotion` takes them. keyframe: the
-    name of the start pose, None for qpos0. positions: of single hinges and slides at the start [rad, m]. strict: stop
-    where a muscle's path cannot be found.
+    Args:
+        duration: simulated time [s], rounded to whole time steps.
+        sample: time between samples [s], rounded to whole time steps.
+        timestep: time step [s]; None for the model's.
+        integrator: "euler", "rk4", "implicit" or "implicitfast"; None for the model's.
+        mode: "python" for a `MuscleSystem`; "wrench" or "transmission" for the engine plugin in this mode.
+        excitation: entries as for `Excitation`.
+        seed: seed of the excitation pattern `random`.
+        prescribed: joints that follow a motion, as for `PrescribedMotion`.
+        keyframe: name of the keyframe of the start; None for qpos0.
+        positions: start positions of hinges and slides by name [rad, m].
+        strict: raise `PathError` if a muscle's path cannot be found.
     """
 
     duration: float = 1.0
@@ -48,7 +55,7 @@ class RunSettings:
 
 
 class WallTime(NamedTuple):
-    """Wall time [s]: of the simulation, and of sampling, drawing and writing it."""
+    """Wall time [s] of the simulation, and of sampling, drawing and writing."""
 
     simulation: float
     outputs: float
@@ -57,8 +64,17 @@ class WallTime(NamedTuple):
 class Simulation:
     """A model at the start of a run, with its excitation and its prescribed joints.
 
-    source: an MJCF or MJB file, or "myo_sim:NAME". option: what the prescribed joints were given by, for messages.
-    `ModelError` or `SignalError` for settings that do not fit the model.
+    Call `begin`, then `advance`. `engine.model` and `engine.data` are the simulated model and its data; `muscles` has
+    the results at the last sample.
+
+    Args:
+        source: an MJCF or MJB file, or "myo_sim:NAME".
+        settings: the settings of the run.
+        option: name of the command-line option for prescribed joints, for messages.
+
+    Raises:
+        ModelError: the model cannot be loaded, or a setting does not fit it.
+        SignalError: an entry of the excitation or of the prescribed joints is not valid.
     """
 
     def __init__(self, source: str, settings: RunSettings, *, option: str = "") -> None:
@@ -78,7 +94,7 @@ class Simulation:
 
     @property
     def duration(self) -> float:
-        """The set duration as whole time steps [s]."""
+        """The duration [s], rounded to whole time steps."""
         return self._steps * self._timestep
 
     @property
@@ -90,14 +106,14 @@ class Simulation:
         return max(1, math.ceil(self.settings.duration / self._timestep - 1e-6))
 
     def begin(self) -> None:
-        """Compute all at the start; compiles where that is still to do, before the clock starts.
+        """Evaluate everything at the start, which also compiles the kernels before time is measured.
 
-        `ModelError` for a muscle that would have to hold its last force and has none yet, as an end of it lies inside
-        a surface.
+        Raises `ModelError` if a muscle has no path at the start, because an end lies inside a surface: it has no last
+        valid force to keep.
         """
         self.prescribed.place(self.engine.data)
         self.excitation.write(self.engine.data)
-        self.engine.look()
+        self.engine.evaluate()
         muscles = self.muscles
         inside = muscles.held & (muscles.status == Status.ENDPOINT_INSIDE)
         for i in np.flatnonzero(inside)[:1].tolist():
@@ -110,10 +126,19 @@ class Simulation:
         progress: Callable[[float], object] = lambda seconds: None,
         stopped: Callable[[], object] = lambda: False,
     ) -> WallTime:
-        """Run for the set duration, or until `stopped` returns something true; return the time that it took.
+        """Run for the duration, or until `stopped` returns a true value.
 
-        logs: called with the state of every sample, the muscles evaluated at it; also at the end, unless stopped.
-        progress: called at every sample with the simulated time since the last one [s].
+        Args:
+            logs: called with the data of every sample, after the muscles' evaluation; also at the end, unless stopped.
+            progress: called at every sample with the simulated time since the last one [s].
+            stopped: called before every step; a true value ends the run.
+
+        Returns:
+            The wall time.
+
+        Raises:
+            StateError: the motion became unstable.
+            PathError: a path was not found, with `strict`.
         """
         data, timestep, steps = self.engine.data, self._timestep, self._steps
         stride = max(1, round(self.settings.sample / timestep))
@@ -133,20 +158,32 @@ class Simulation:
         return WallTime(time.perf_counter() - started - outputs, outputs)
 
     def _sample(self, logs: Sequence[Log]) -> float:
-        """Log the present state; return the time [s] that it took."""
+        """Log the present state; return the wall time [s] of this."""
         started = time.perf_counter()
         if logs:
-            self.engine.look()
+            self.engine.evaluate()
             for log in logs:
-                log(self.engine.seen)
+                log(self.engine.sampled)
         return time.perf_counter() - started
 
 
 def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = DEFAULT_KINDS) -> Table:
     """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
 
-    source: an MJCF or MJB file, or "myo_sim:NAME". kinds: which numbers the table holds, of `run_table.KINDS`; columns
-    are called KIND:NAME, in SI units. Errors as `Simulation` and its `advance` raise them.
+    Args:
+        source: an MJCF or MJB file, or "myo_sim:NAME".
+        settings: the settings of the run; None for the defaults.
+        kinds: the quantities in the table, such as "qpos", "length" or "moment_arm", as for `mjwrap run --columns`.
+
+    Returns:
+        The table, with columns called KIND:NAME, in SI units.
+
+    Raises:
+        ModelError: the model cannot be loaded, or a setting does not fit it.
+        SignalError: an entry of the excitation or of the prescribed joints is not valid.
+        StateError: the motion became unstable.
+        PathError: a path was not found, with `strict`.
+        TableError: a kind is unknown.
     """
     simulation = Simulation(source, settings or RunSettings())
     table = RunTable(simulation.muscles.model, simulation.muscles, kinds)

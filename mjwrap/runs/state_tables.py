@@ -1,4 +1,4 @@
-"""States of a model over time, from a table: positions, velocities and activations by name."""
+"""States of a model over time from a table: positions, velocities and activations by name."""
 
 from __future__ import annotations
 
@@ -25,9 +25,16 @@ _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 @dataclass(frozen=True)
 class States:
-    """States (T, ...): time [s], qpos, qvel, act, ctrl; remarks: what was not said, and what took its place.
+    """States of a model over time.
 
-    own (T, 2n): activation and fibre length [m] of each muscle, for those whose states are not in `act`.
+    Attributes:
+        time: (T,) times [s].
+        qpos: (T, nq) positions.
+        qvel: (T, nv) velocities.
+        act: (T, na) activations.
+        ctrl: (T, nu) controls.
+        own: (T, 2n) activation and fibre length [m] of each muscle, used for muscles whose states are not in `act`.
+        remarks: values that are missing from the table, and their substitutes.
     """
 
     time: Array
@@ -39,7 +46,7 @@ class States:
     remarks: tuple[str, ...]
 
     def put(self, muscles: MuscleSystem, data: mujoco.MjData, k: int) -> None:
-        """Put state k into data, and what has no place there into the muscles."""
+        """Write state k to data, and the states of muscles without an actuator to the muscles."""
         data.time = self.time[k]
         data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = (
             self.qpos[k],
@@ -52,11 +59,11 @@ class States:
             own = self.own[k].reshape(-1, 2)
             put_own(muscles, data, {i: (own[i, 0], own[i, 1]) for i in without})
             for i in without:
-                muscles.excitation[i] = own[i, 0]  # what a muscle without dynamics pulls with
+                muscles.excitation[i] = own[i, 0]  # the activation of a muscle without activation dynamics
 
 
 def put_own(muscles: MuscleSystem, data: mujoco.MjData, own: Mapping[int, tuple[float, float]]) -> None:
-    """Set activation and fibre length [m] of muscles, by number, that have no actuator to keep them in `act`."""
+    """Set activation and fibre length [m] of muscles (by number) that have no actuator with states in `act`."""
     branch = muscles.branch(data)
     rows = branch[len(branch) - 2 * muscles.n :].reshape(-1, 2)
     for i, pair in own.items():
@@ -65,13 +72,25 @@ def put_own(muscles: MuscleSystem, data: mujoco.MjData, own: Mapping[int, tuple[
 
 
 def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjData, table: Table) -> States:
-    """Return the states that a table holds; what it does not name stays as at the start.
+    """Return the states in a table; values missing from it are those of the start.
 
     Columns: "qpos:JOINT", "qvel:JOINT", "act:ACTUATOR", "ctrl:ACTUATOR", "activation:MUSCLE", "fiber_length:MUSCLE" as
-    `mjwrap run` writes them; "qpos[3]" by number; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
-    "MUSCLE/fiber_length" as in OpenSim's files, with the path before them or without. "act" counts before what else
-    says the same. Rotations are in rad, or in degrees where the header says so. Without velocities they are the
-    differences of the positions. `TableError` where no column names a joint, and for arrays of another model's size.
+    in tables of `mjwrap run`; "qpos[3]" by index; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
+    "MUSCLE/fiber_length" as in OpenSim's files, with or without a path before them. "act" overrides other columns for
+    the same state. Rotations are in rad, or in degrees if the header says so. Velocities that are missing are computed
+    as differences of the positions.
+
+    Args:
+        model: the model.
+        muscles: its muscles.
+        start: data with the values for everything that is missing from the table.
+        table: the table.
+
+    Returns:
+        The states.
+
+    Raises:
+        TableError: no column names a joint, or the size of an array does not fit the model.
     """
     reader = _Reader(model, muscles, start, table)
     reader.check_widths()
@@ -84,7 +103,7 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
 
 
 class _Reader:
-    """Sorts columns into the arrays of a state."""
+    """Sort columns into the arrays of a state."""
 
     def __init__(
         self, model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjData, table: Table
@@ -103,9 +122,9 @@ class _Reader:
         self.unused: list[str] = []
         self._muscles = set(muscles.names)
         self._hinges = {n for n, j in single_joints(model).items() if int(model.jnt_type[j]) == _HINGE}
-        # by muscle: the array and the place in it
+        # by muscle: the array and the index in it
         self._places: dict[str, dict[str, tuple[str, int]]] = {"activation": {}, "fiber_length": {}}
-        self._of_muscles: set[int] = set()  # places in act
+        self._of_muscles: set[int] = set()  # indices in act
         for i, muscle in enumerate(muscles.declarations):
             held = int(model.actuator_actnum[muscle.actuator]) if muscle.actuator >= 0 else 0
             own = muscle.actuator < 0
@@ -117,7 +136,7 @@ class _Reader:
                 self._places["fiber_length"][muscle.name] = array, first + 1
 
     def check_widths(self) -> None:
-        """Raise `TableError` where an array has more columns than the model's, or, in an NPZ file, fewer."""
+        """Raise `TableError` if an array has more columns than the model's or, in an NPZ file, fewer."""
         for kind, names in self.names.items():
             given = [int(m[1]) for m in (re.fullmatch(rf"{kind}\[(\d+)\]", n) for n in self.table.names) if m]
             count = max(given) + 1 if given else int(kind in self.table.names)
@@ -129,7 +148,7 @@ class _Reader:
                 )
 
     def take(self, column: str) -> None:
-        """Put a column where it belongs."""
+        """Copy a column to its place in a state."""
         for kind, place, turns in self._readings(column):
             values = self.table[column]
             self.arrays[kind][:, place] = np.radians(values) if turns and self.table.in_degrees else values
@@ -138,7 +157,7 @@ class _Reader:
         self.unused.append(column)
 
     def _readings(self, column: str) -> Iterator[tuple[str, int, bool]]:
-        """Yield where a column may belong, best first: array, place in it, whether it is a rotation."""
+        """Yield the possible places of a column, best first: array, index in it, whether it is a rotation."""
         for kind, names in self.names.items():
             if column.startswith(f"{kind}:") and column.removeprefix(f"{kind}:") in names:
                 yield kind, names.index(column.removeprefix(f"{kind}:")), False
@@ -157,23 +176,23 @@ class _Reader:
                 yield kind, self.names[kind].index(joint), joint in self._hinges
 
     def states(self) -> States:
-        """Return what was sorted, velocities from differences where there are none."""
+        """Return the states; velocities that are missing are computed as differences."""
         arrays, model, time = self.arrays, self.model, self.table.time
         remarks = []
         left = [name for i, name in enumerate(self.names["qpos"]) if i not in self.found["qpos"]]
         if left:
-            remarks.append(f"{counted(len(left), 'position')} as at the start: {_few(left)}")
+            remarks.append(f"{counted(len(left), 'position')} missing, taken from the start: {_few(left)}")
         if not self.found["qvel"]:
             remarks.append("velocities are differences of the positions")
             arrays["qvel"] = _differences(model, time, arrays["qpos"])
         remarks += self._not_given()
         self.unused = [name for name in self.unused if not self._follows(name)]
         if self.unused:
-            remarks.append(f"{counted(len(self.unused), 'column')} not about the state: {_few(self.unused)}")
+            remarks.append(f"{counted(len(self.unused), 'column')} not used: {_few(self.unused)}")
         return States(time, **arrays, remarks=tuple(remarks))
 
     def _not_given(self) -> list[str]:
-        """Return remarks on the states of muscles and actuators that no column gives."""
+        """Return remarks on states of muscles and actuators that are missing from the table."""
         activations = [(name, *place) for name, place in self._places["activation"].items()]
         activations += [
             (name, "act", i) for i, name in enumerate(self.names["act"]) if i not in self._of_muscles
@@ -181,18 +200,18 @@ class _Reader:
         fibers = [(name, *place) for name, place in self._places["fiber_length"].items()]
         remarks = []
         for what, places, instead in (
-            ("activation", activations, "as at the start"),
-            ("fibre length", fibers, "as at the start, or in static equilibrium"),
+            ("activation", activations, "taken from the start"),
+            ("fibre length", fibers, "taken from the start, or in static equilibrium"),
         ):
             left = [name for name, array, i in places if i not in self.found[array]]
             if left:
                 remarks.append(
-                    f"{len(left)} of {counted(len(places), what)} not given: {_few(left)}: {instead}"
+                    f"{len(left)} of {counted(len(places), what)} missing, {instead}: {_few(left)}"
                 )
         return remarks
 
     def _follows(self, column: str) -> bool:
-        """Return whether a column is a result of `mjwrap run` that follows from the state."""
+        """Return whether a column is a result of `mjwrap run`, which follows from the state."""
         kind, mark, name = column.partition(":")
         muscle = name.partition(":")[0] if kind == "moment_arm" else name
         return bool(mark) and kind in (*MUSCLE_KINDS, "moment_arm") and muscle in self._muscles

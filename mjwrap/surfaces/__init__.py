@@ -1,4 +1,4 @@
-"""Wrapping surfaces: the built-in ones, those that users write as functions, and triangles for pictures."""
+"""Wrapping surfaces: built-in ones, surfaces written by users as functions, and triangles for pictures."""
 
 from mjwrap.surfaces.primitives import (
     Capsule,

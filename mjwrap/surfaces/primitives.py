@@ -1,7 +1,7 @@
 """The built-in wrapping surfaces: frozen, validated descriptions without a pose.
 
-A surface knows its sizes and what is true of it (`surface.py` says what a class can say); the mathematics is in
-`mjwrap/kernels`. Axes of revolution are local z, as in MuJoCo.
+A surface has sizes and the properties listed in `surface.py`; the mathematics is in `mjwrap/kernels`. Axes of
+revolution are local z, as in MuJoCo.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.surfaces.surface import Array, Surface, axes, positive
 
-FLATTEST_CONE = 1e-3  # smallest slope: a cone that is closer to a cylinder loses digits to its far apex
-UNBOUNDED = 4.0  # half length in a picture of a cylinder without one, in radii
+FLATTEST_CONE = (
+    1e-3  # smallest slope: a cone that is closer to a cylinder is inaccurate because of its far apex
+)
+UNBOUNDED = 4.0  # half length, in radii, with which an infinite cylinder is drawn
 
 
 def _ball(count: int) -> tuple[Array, Array]:
@@ -29,7 +31,7 @@ def _ball(count: int) -> tuple[Array, Array]:
 
 
 def _tube(radius: float, half: float, given: float | None, wide: float, count: int) -> tuple[Array, Array]:
-    """Return radii and heights (count,) of a cylinder's circles; without a half length the given one, or UNBOUNDED."""
+    """Return radii and heights (count,) of a cylinder's circles; an infinite one gets the given half length."""
     if not math.isfinite(half):
         half = UNBOUNDED * wide if given is None else given
     return np.full(count, radius), np.linspace(-half, half, count)
@@ -159,9 +161,9 @@ class Ellipsoid(Surface):
 
 @dataclass(frozen=True)
 class EllipticCylinder(Surface):
-    """A cylinder about local z with an ellipse for its section.
+    """A cylinder about local z with an elliptic section.
 
-    radii (2,) [m]: semi-axes along local x and y, finite and positive; half_length [m]: a range of validity, as of
+    radii (2,) [m]: semi-axes along local x and y, finite and positive; half_length [m]: a range of validity, as for
     `Cylinder`. `GeometryError` for other sizes.
     """
 
@@ -196,7 +198,7 @@ class EllipticCylinder(Surface):
 
     @property
     def columns(self) -> tuple[float, ...]:
-        """Both semi-axes and infinity for the third: to the kernels it is an ellipsoid [m]."""
+        """Both semi-axes, and infinity for the third [m]: the kernels treat it as an ellipsoid."""
         return (*self.radii, math.inf)
 
     @property
@@ -226,7 +228,7 @@ class Torus(Surface):
     minor_radius: float
     kind: ClassVar[int] = layout.TORUS
     branched: ClassVar[bool] = True
-    touches: ClassVar[int] = 2  # over the hole
+    touches: ClassVar[int] = 2  # a string can bridge the hole and touch the ring before and after it
     numeric: ClassVar[str] = "torus_size"
     numeric_sizes: ClassVar[str] = "major_radius minor_radius"
     numeric_least: ClassVar[int] = 2

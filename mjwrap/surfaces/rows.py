@@ -1,4 +1,4 @@
-"""The kernels' rows of a surface: the one place where a class becomes columns."""
+"""Convert a surface to the kernels' rows; no other module does this."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def traits(surface: Surface) -> int:
-    """Return the sum of the trait bits of a surface, as `mjwrap/kernels/layout.py` lists them."""
+    """Return the sum of a surface's trait bits, which `mjwrap/kernels/layout.py` lists."""
     return (
         layout.CLOSED_FORM * surface.closed_form
         + layout.BRANCHED * surface.branched
@@ -28,12 +28,12 @@ def traits(surface: Surface) -> int:
 def write_surface(surface: Surface, rows: Array) -> None:
     """Write a surface to all rows (n, ROW): kind, sizes and traits, not pose, touch number and saved solution.
 
-    `GeometryError` for a kind that the kernels do not know.
+    Raises `GeometryError` for a kind that the kernels do not know.
     """
     name, kind, columns = type(surface).__name__, getattr(surface, "kind", None), surface.columns
     if kind is None or not is_surface_kind(kind):
         raise GeometryError(
-            f"{name}: the kernels know no surface of kind {kind!r}; kinds are listed in mjwrap/kernels/layout.py"
+            f"{name}: the kernels have no surface of kind {kind!r}; kinds are listed in mjwrap/kernels/layout.py"
         )
     if len(columns) > layout.SIZE - layout.DIM:
         raise GeometryError(
@@ -47,9 +47,9 @@ def write_surface(surface: Surface, rows: Array) -> None:
 
 
 def surface_rows(surface: Surface, inside: bool = False) -> Array:
-    """Return the rows (touches, ROW) of a surface, cold, without a pose and a hint.
+    """Return the rows (touches, ROW) of a surface for a cold start, without pose and hint.
 
-    inside: the string is held to the solid. `GeometryError` as of `write_surface`.
+    inside: the string must meet the solid. Raises `GeometryError` as `write_surface` does.
     """
     rows = np.zeros((surface.touches, layout.ROW))
     write_surface(surface, rows)

@@ -1,7 +1,7 @@
-"""What all wrapping surfaces have in common: sizes, traits and what the kernels, MJCF and pictures take from a class.
+"""The base class of all wrapping surfaces: sizes, traits, and properties for the kernels, MJCF and pictures.
 
-A built-in surface is a frozen dataclass in `primitives.py` that overrides what differs from the defaults here. No other
-Python module asks of which class a surface is.
+A built-in surface is a frozen dataclass in `primitives.py` that overrides the defaults here. No other Python module
+tests the class of a surface.
 """
 
 from __future__ import annotations
@@ -26,23 +26,25 @@ class Surface:
     kind: ClassVar[int]  # of `mjwrap/kernels/layout.py`
 
     # ------------------------------------------------------- traits; kernels read them from the surface's row
-    closed_form: ClassVar[bool] = False  # the wrap between two points has a formula, in `wraps/single.py`
-    branched: ClassVar[bool] = False  # which side a string passes is topological, told by a swept angle
-    touches: ClassVar[int] = 1  # how often a taut string may touch it; more often than once: it has hollows
-    one_sided: ClassVar[bool] = False  # two points have one stable wrap between them at most
-    random_starts: ClassVar[bool] = True  # a cold start may throw strings over it, with hints drawn by chance
-    ellipse_sections: ClassVar[bool] = False  # a stretched sphere with `columns` for its semi-axes
-    held_about: ClassVar[float] = (
-        0.0  # ABOUT_POINT or ABOUT_AXIS: a string can be held inside it; 0: it cannot
+    closed_form: ClassVar[bool] = (
+        False  # whether the wrap between two points has a closed form, in `wraps/single.py`
     )
+    branched: ClassVar[bool] = (
+        False  # whether the side on which a string passes is topological, given by a swept angle
+    )
+    touches: ClassVar[int] = 1  # how often a taut string may touch it; more than once if it has hollows
+    one_sided: ClassVar[bool] = False  # whether there is at most one stable wrap between two points
+    random_starts: ClassVar[bool] = True  # whether a cold start may try strings over it, with random hints
+    ellipse_sections: ClassVar[bool] = False  # whether it is a stretched sphere with `columns` as semi-axes
+    held_about: ClassVar[float] = 0.0  # ABOUT_POINT or ABOUT_AXIS if a string can be held inside it, else 0
     geom_columns: ClassVar[
         tuple[tuple[int, int], ...]
-    ] = ()  # (size of a geom of its type, column that copies it)
+    ] = ()  # (index of a geom's size, column that contains it)
 
     # ------------------------------------------------------------- the numeric that declares it in an MJCF file
-    numeric: ClassVar[str] = ""  # what the numeric's name contains; empty: it cannot be declared
-    numeric_sizes: ClassVar[str] = ""  # what its values mean, in order, a word each
-    numeric_least: ClassVar[int] = 0  # fewest values
+    numeric: ClassVar[str] = ""  # word in the numeric's name; empty if the surface cannot be declared
+    numeric_sizes: ClassVar[str] = ""  # meaning of its values, in order, one word each
+    numeric_least: ClassVar[int] = 0  # smallest number of values
 
     @classmethod
     def from_numeric(cls, *values: float) -> Surface:
@@ -53,36 +55,36 @@ class Surface:
 
     @property
     def dims(self) -> tuple[float, ...]:
-        """Sizes in the order in which they are listed [m]."""
+        """Sizes in the order of the class's fields [m]."""
         raise NotImplementedError(f"{type(self).__name__} has no sizes")
 
     @property
     def columns(self) -> tuple[float, ...]:
-        """What stands in the kernels' DIM columns, four numbers at most; the sizes where nothing else is said."""
+        """The contents of the kernels' DIM columns, at most four numbers; by default the sizes."""
         return self.dims
 
     @property
     def size(self) -> float:
-        """A length by which steps on the surface are limited, about its smallest radius of curvature [m]."""
+        """A length that limits steps on the surface, about its smallest radius of curvature [m]."""
         return self.dims[0]
 
     @property
     def z_limit(self) -> float:
-        """How far along local z, to both sides, the surface may be touched [m]; infinite where it does not end."""
+        """Largest |z| at which the surface may be touched [m]; infinite if it does not end."""
         return math.inf
 
     # ---------------------------------------------------------------------------------------------- pictures
 
     def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
-        """Return radii and heights (count,) [m] of circles about local z that make a picture of the surface.
+        """Return radii and heights (count,) [m] of circles about local z with which the surface is drawn.
 
-        half_length [m]: where to end if it does not end itself. `GeometryError` for a surface that has no such circles.
+        half_length [m]: of an infinite surface. Raises `GeometryError` for a surface without such circles.
         """
         raise GeometryError(f"{type(self).__name__} has no grid of points")
 
     @property
     def stretch(self) -> tuple[float, float]:
-        """By how much the circles are stretched along local x and y."""
+        """Factors by which the circles are stretched along local x and y."""
         return 1.0, 1.0
 
 
@@ -92,7 +94,7 @@ def positive(surface: Surface, name: str, value: Any, unbounded: bool = False) -
 
 
 def axes(surface: Surface, name: str, value: Any, count: int) -> None:
-    """Store a row of `count` positive sizes as a tuple of floats; `GeometryError` for anything else."""
+    """Store `count` positive sizes as a tuple of floats; `GeometryError` for anything else."""
     try:
         values = tuple(value)
     except TypeError:

@@ -1,4 +1,4 @@
-"""Wrapping surfaces as triangles, for pictures and for sampling them: points in the surface's own frame [m]."""
+"""Wrapping surfaces as triangles, for pictures and for samples; points are in the surface's own frame [m]."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def surface_grid(
 ) -> Array:
     """Return points (along, around, 3) of a surface [m]: circles about local z, the first point of each also its last.
 
-    half_length [m]: of cylinders that have none (four times their radius otherwise). `GeometryError` for surfaces that
+    half_length [m]: of infinite cylinders (default: four times the radius). Raises `GeometryError` for surfaces that
     have no such grid.
     """
     turn = np.linspace(0.0, 2.0 * math.pi, around)
-    turn[-1] = 0.0  # to the last bit the same point
+    turn[-1] = 0.0  # exactly the same point
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(around)], axis=-1)  # (around, 3)
     radii, height = surface.profile(along, half_length)
     grid = radii[:, None, None] * ring * (*surface.stretch, 1.0)
@@ -31,7 +31,7 @@ def surface_grid(
 
 
 def triangles(grid: Array) -> tuple[Array, Faces]:
-    """Return vertices (n, 3), each once, and faces (m, 3) of a grid; the faces' right-hand normals point outwards."""
+    """Return vertices (n, 3), without repetition, and faces (m, 3) of a grid; right-hand normals point outwards."""
     along, around = grid.shape[:2]
     index = np.arange(along * around).reshape(along, around)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
@@ -39,4 +39,6 @@ def triangles(grid: Array) -> tuple[Array, Faces]:
     vertices, place = np.unique(grid.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)  # + 0.0: no -0.0
     faces = place.reshape(-1)[faces]
     a, b, c = faces.T
-    return vertices, faces[(a != b) & (b != c) & (c != a)]  # at poles and tips only one of two is left
+    return vertices, faces[
+        (a != b) & (b != c) & (c != a)
+    ]  # at poles and tips only one of two triangles remains

@@ -1,4 +1,4 @@
-"""Wrapping surfaces from a user's own plain Python functions, compiled to machine code as the kernels are."""
+"""Wrapping surfaces from a user's own Python functions, which are compiled to machine code like the kernels."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Function = Callable[..., Any] | str
 
 
 class CustomSurface(Surface):
-    """A surface made of machine code; equal to any other made from the same source and numbers."""
+    """A surface compiled from a user's functions; equal to any other with the same source and numbers."""
 
     kind: ClassVar[int] = layout.CUSTOM
-    touches: ClassVar[int] = 2  # whether it has hollows is not known
-    random_starts: ClassVar[bool] = False  # each would cost a search by calls of its functions
+    touches: ClassVar[int] = 2  # it is unknown whether the surface has hollows
+    random_starts: ClassVar[bool] = False  # each would need a search with calls of its functions
     _made: build.Made
 
     def _set(self, made: build.Made) -> None:
@@ -29,9 +29,9 @@ class CustomSurface(Surface):
 
     @property
     def dims(self) -> tuple[float, ...]:
-        """Radius of a sphere about the origin that holds the surface, or infinite [m]; addresses of its functions.
+        """Radius of a sphere about the origin that contains the surface, or infinite [m]; addresses of its functions.
 
-        The addresses, of geodesic, projection and height, are valid as long as this process runs.
+        The addresses of geodesic, projection and height are valid in this process.
         """
         code = self._made.module
         addresses = (code.geodesic.address, code.project.address, code.height.address)
@@ -44,7 +44,7 @@ class CustomSurface(Surface):
 
     @property
     def source(self) -> str:
-        """The text of the module that was made from the user's functions, derivatives and all."""
+        """The text of the module that was made from the user's functions, with all derivatives."""
         return str(self._made.module.TEXT)
 
     def __eq__(self, other: object) -> bool:
@@ -62,7 +62,7 @@ class CustomSurface(Surface):
 
 
 def _restored(kind: type[CustomSurface], label: str, key: str, generator: str, text: str) -> CustomSurface:
-    """Return a surface that was pickled: its functions need not exist here."""
+    """Return a pickled surface; its functions need not exist in this process."""
     surface = kind.__new__(kind)
     surface._set(build.remade(label, key, generator, text))
     return surface
@@ -144,7 +144,7 @@ class ImplicitSurface(CustomSurface):
     ) -> None:
         label = f"ImplicitSurface {name or getattr(phi, '__name__', 'phi')}"
         if hessian is not None and gradient is None:
-            raise GeometryError(f"{label}: hessian needs gradient beside it")
+            raise GeometryError(f"{label}: hessian needs gradient too")
         try:
             widths: tuple[Any, ...] = (extent,) * 3 if isinstance(extent, int | float) else tuple(extent)
         except TypeError:

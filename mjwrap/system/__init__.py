@@ -1,4 +1,4 @@
-"""MuscleSystem: the only reader and writer of mjData."""
+"""`MuscleSystem`: drives the muscles of a model; the only package that reads and writes mjData."""
 
 from mjwrap.system.muscle_system import MuscleSystem
 

@@ -1,7 +1,7 @@
-"""Sets MuJoCo's control callback for the length of a step.
+"""Set MuJoCo's control callback during a step.
 
-The callback belongs to the whole process, so several threads that step at the same time share one: it finds the step
-that it belongs to by the address of the data. The last step to end gives the callback back to whoever had it before.
+MuJoCo has one control callback per process. Threads that step at the same time share it: it finds its step by the
+address of the data. When the last step has ended, the callback that was set before is set again.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import mujoco
 
 
 class _Step(NamedTuple):
-    """A step in progress: what puts its forces in, and what takes them out before others look."""
+    """A step in progress; act: adds the muscles' forces; remove_forces: removes them before another callback runs."""
 
     act: Callable[[], None]
-    retreat: Callable[[], None]
+    remove_forces: Callable[[], None]
 
 
 _LOCK = threading.Lock()
@@ -28,10 +28,10 @@ _before: Any = None
 
 
 def _dispatch(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Call a controller written in Python, then the step that `data` belongs to."""
+    """Call the user's controller, a Python function, then the step to which `data` belongs."""
     step = _STEPS.get(data._address)
     if step is not None:
-        step.retreat()
+        step.remove_forces()
     _before(model, data)
     if step is not None:
         step.act()
@@ -39,15 +39,15 @@ def _dispatch(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 def _dispatch_addresses(model: int, data: int) -> None:
-    """Do the same where no controller in Python is there.
+    """Do the same if the user has no controller, or one in C.
 
-    MuJoCo calls this for every model of the process, those that another thread is compiling among them, which its
-    Python bindings do not know: addresses serve all of them.
+    MuJoCo calls this for every model of the process, also for models that another thread is compiling. Its Python
+    bindings do not know these, so the function works with addresses.
     """
     step = _STEPS.get(data)
     if _before is not None:
         if step is not None:
-            step.retreat()
+            step.remove_forces()
         _before(model, data)
     if step is not None:
         step.act()
@@ -55,12 +55,12 @@ def _dispatch_addresses(model: int, data: int) -> None:
 
 @contextmanager
 def control_callback(
-    data: mujoco.MjData, act: Callable[[], None], retreat: Callable[[], None]
+    data: mujoco.MjData, act: Callable[[], None], remove_forces: Callable[[], None]
 ) -> Iterator[None]:
-    """Run `act` in MuJoCo's control callback for `data`, for the length of a with block.
+    """Run `act` in MuJoCo's control callback for `data` during a with block.
 
-    A callback that is there already, a Python function or a C function pointer, runs first, after `retreat` has taken
-    out of the data what `act` put in at the stage before.
+    A callback that was set before, a Python function or a C function pointer, runs first. Before it, `remove_forces`
+    removes from the data what `act` added at the previous stage.
     """
     global _before
     address = data._address
@@ -69,7 +69,7 @@ def control_callback(
             _before = mujoco.get_mjcb_control()
             native = _before is None or hasattr(_before, "argtypes")  # a C function pointer
             mujoco.set_mjcb_control(_dispatch_addresses if native else _dispatch)
-        _STEPS[address] = _Step(act, retreat)
+        _STEPS[address] = _Step(act, remove_forces)
     try:
         yield
     finally:

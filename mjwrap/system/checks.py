@@ -1,4 +1,4 @@
-"""Checks the state of a simulation: whether it is finite, whether MuJoCo reset it, which sites are inside surfaces."""
+"""Check the state of a simulation: is it finite, has MuJoCo reset it, which sites lie inside surfaces?"""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _BADQACC = int(mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 def resets(data: mujoco.MjData) -> int:
-    """Return how often MuJoCo has found the state not finite or too large; it resets the data then."""
+    """Return how often MuJoCo has reset the data because the state was not finite or too large."""
     number = data.warning.number
     return int(number[_BADQPOS]) + int(number[_BADQVEL]) + int(number[_BADQACC])
 
 
 def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> str:
-    """Return which sites of a muscle lie inside the surfaces next to them at the given poses, or an empty string."""
+    """Return as text which sites of a muscle lie inside their neighbouring surfaces at the given poses, or ""."""
     found = []
     for route in muscle.routes:
         for node, before, after in route.geom_ends():
@@ -41,7 +41,7 @@ def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDecla
 
 
 def check_state(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Raise `StateError` naming what is not finite."""
+    """Raise `StateError` if a number of the state is not finite; the message names it."""
     for what, values in (
         ("qpos", data.qpos),
         ("qvel", data.qvel),

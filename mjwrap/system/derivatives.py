@@ -1,4 +1,4 @@
-"""Computes how the length Jacobian of a MuscleSystem changes along a motion."""
+"""Compute the rate of the length Jacobian of a MuscleSystem along a motion."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 
 def length_jacobian_rate(muscles: Results, state: State, direction: ArrayLike | None) -> Array:
-    """Return the rate (n, nv) of dl/dq along `direction` (nv,), or qvel, at the poses that `state` was evaluated at."""
+    """Return the rate (n, nv) of dl/dq along `direction` (nv,), or along qvel, at the poses of the last evaluation."""
     model, plan, scratch = muscles.model, muscles._plan, state.scratch
     for i in np.flatnonzero(state.status):
         raise PathError(
-            f"muscle '{muscles.names[i]}' has no path whose derivatives could be taken: {muscles.reason(int(i))}"
+            f"muscle '{muscles.names[i]}' has no path, so its derivatives do not exist: {muscles.reason(int(i))}"
         )
     if direction is not None:
         given = np.asarray(direction, dtype=np.float64)

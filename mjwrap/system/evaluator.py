@@ -1,4 +1,4 @@
-"""Evaluates the muscles of a MuscleSystem; `muscle_system.py` says at which state and when."""
+"""Evaluate the muscles of a MuscleSystem at a state that `muscle_system.py` chooses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TOLERANCE = 1e-10  # largest tangency error of a path
 
 
 class Evaluator(Results):
-    """The muscles of a model, what is known of each mjData, and one evaluation of all paths, states and tensions."""
+    """The muscles of a model, the state of each mjData, and the evaluation of all paths, states and tensions."""
 
     _last: State
 
@@ -34,7 +34,7 @@ class Evaluator(Results):
             )
         if has_plugin(model):
             raise ModelError(
-                "mjwrap's engine plugin drives the muscles of this model already (install): mj_step moves it, and "
+                "the engine plugin already drives the muscles of this model (install): mj_step moves it, and "
                 "mjwrap.plugin.read(data) reads it; for a MuscleSystem compile a spec without the plugin"
             )
         self.strict = strict
@@ -52,7 +52,7 @@ class Evaluator(Results):
 
     @property
     def excitation(self) -> Array:
-        """Excitations (n,) of muscles without an actuator: set single ones, or all; `StateError` for another shape."""
+        """Excitations (n,) of muscles without an actuator: set single ones, or all; `StateError` for a wrong shape."""
         return self._excitation
 
     @excitation.setter
@@ -66,12 +66,12 @@ class Evaluator(Results):
     def _state(self, data: mujoco.MjData) -> State:
         if self._takeover.was_released():
             raise ModelError(
-                "the actuators of this model pull by themselves again (release); build a new MuscleSystem to go on"
+                "this MuscleSystem has released its actuators to MuJoCo; build a new MuscleSystem to go on"
             )
         if not isinstance(data, mujoco.MjData):
             raise StateError(f"expected an MjData, not {type(data).__name__}")
         if data.model._address != self.model._address:
-            raise StateError("this MjData belongs to another model than this MuscleSystem")
+            raise StateError("this MjData belongs to a different model than this MuscleSystem")
         key = id(data)
         if key not in self._states:
             self._states[key] = State(self.model, self._plan)
@@ -79,7 +79,7 @@ class Evaluator(Results):
         return self._states[key]
 
     def _check(self, data: mujoco.MjData) -> None:
-        """Raise `StateError` naming what is not finite."""
+        """Raise `StateError` if a number of the state is not finite; the message names it."""
         if finite_checks.all_finite(
             data.qpos, data.qvel, data.act, data.ctrl, data.mocap_pos, data.mocap_quat, self._excitation
         ):
@@ -91,9 +91,9 @@ class Evaluator(Results):
     def _evaluate(
         self, state: State, poses: mujoco.MjData, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0
     ) -> None:
-        """Paths, activations and tensions from the poses and velocities of `poses`; wrenches into state.wrench.
+        """Compute paths, activations, tensions and (state.wrench) wrenches at the poses and velocities of `poses`.
 
-        since [s]: how old the states in `data` are; ahead [s]: how long the tensions are to act.
+        since [s]: age of the states in `data`; ahead [s]: time for which the tensions will act.
         """
         self._switch_off()
         failed = from_python.evaluate(
@@ -112,7 +112,7 @@ class Evaluator(Results):
             self._failed(state, poses, data)
 
     def _switch_off(self) -> None:
-        """Note which muscles the model's options switch off: all, or those of an actuator group."""
+        """Note which muscles are switched off by the model's options: all, or those of an actuator group."""
         everything = bool(int(self.model.opt.disableflags) & _DISABLE_ACTUATION)
         off = -1 if everything else int(self.model.opt.disableactuator)
         if off != self._groups_off:
@@ -122,7 +122,7 @@ class Evaluator(Results):
             self._groups_off = off
 
     def _failed(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
-        """Note which muscles have no path; raise where the user asked for that."""
+        """Note which muscles have no path; raise `PathError` if `strict` was given."""
         bad = np.flatnonzero(state.status)
         for i in bad:
             if state.last_failure[i] != state.status[i]:
@@ -139,7 +139,7 @@ class Evaluator(Results):
             raise PathError(f"muscle '{self.names[first]}' at time {data.time:g} s: {self.reason(first)}")
 
     def _refresh(self, state: State, data: mujoco.MjData) -> mujoco.MjData:
-        """Return scratch data with the kinematics of the present qpos and qvel; `data` may lag by a step."""
+        """Return scratch data with the kinematics of the present qpos and qvel: those in `data` may be one step old."""
         self._check(data)
         model, scratch = self.model, state.scratch
         scratch.qpos[:] = data.qpos

@@ -1,4 +1,4 @@
-"""Keeps what the muscles of a model were at many times, and sorts it by muscle when it is asked for."""
+"""Store the results of the muscles of a model at many times, and return them sorted by muscle."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
 
-class Room:
-    """Arrays that are used again, by name: memory that the system has once given costs nothing the next time."""
+class BufferPool:
+    """Arrays by name that are used again: memory that has been allocated once need not be allocated again."""
 
     def __init__(self) -> None:
         self._held: dict[str, NDArray[Any]] = {}
 
     def array(self, name: str, shape: tuple[int, ...], kind: type[np.generic] = np.float64) -> NDArray[Any]:
-        """Return an array whose values are left to chance; what had this name before may change with it."""
+        """Return an uninitialised array; it may share memory with the array that had this name before."""
         size = math.prod(shape)
         if name not in self._held or self._held[name].size < size:
             self._held[name] = np.empty(size, dtype=kind)
@@ -34,19 +34,19 @@ class Room:
 
 
 class Store:
-    """Rows of numbers, frame after frame, each frame's in parts; it grows."""
+    """Rows of numbers, frame after frame, each frame in parts; it grows as needed."""
 
     def __init__(self, frames: int, parts: int, width: int) -> None:
         self.rows = np.empty((0, width), dtype=np.float32)
         self.starts = np.zeros((frames, parts + 1), dtype=np.int64)  # where each part of a frame begins
 
-    def make_room(self, frame: int) -> None:
-        """Grow where a frame did not fit: the first one, and one with more to draw later."""
+    def grow(self, frame: int) -> None:
+        """Grow if a frame did not fit: the first frame, or a later one with more to draw."""
         begin, end = int(self.starts[frame, 0]), int(self.starts[frame, -1])
         if end > len(self.rows):
             count = 2 * (
                 len(self.rows) + (end - begin) * len(self.starts)
-            )  # what is not written to costs nothing
+            )  # memory that is never written to costs nothing
             rows = np.empty((count, self.rows.shape[1]), dtype=np.float32)
             rows[:begin] = self.rows[:begin]
             self.rows = rows
@@ -57,13 +57,13 @@ class Store:
 
 
 class History:
-    """Room for `rows` states, and as many frames, of the muscles of a model and its plan.
+    """Storage for `rows` states and as many frames of the muscles of a model and its plan.
 
-    A state is what every muscle has, a frame what is drawn: poses of the bodies, paths, contact points, forces, and
-    moment arms of the pairs of a muscle and a coordinate that `muscles` and `dofs` (K,) name. Time goes along the first
-    axis of what is read as numbers. Points are in 32 bits; they stand in a Room, if one is given. tree: the last dof of
-    every body (nbody,), the parent of every dof (nv,), the root of every body (nbody,). evaluation: returns the last
-    evaluation, which is kept.
+    A state has the numbers of every muscle. A frame has what is drawn: poses of the bodies, paths, contact points,
+    forces, and the moment arms of pairs of a muscle and a coordinate, given by `muscles` and `dofs` (K,). The first
+    axis of returned numbers is time. Points are float32, in arrays of a `BufferPool` if one is given. tree: the last
+    dof of every body (nbody,), the parent of every dof (nv,), the root of every body (nbody,). evaluation: a function
+    that returns the last evaluation, which is stored.
     """
 
     def __init__(
@@ -88,18 +88,18 @@ class History:
         self._plan = plan.routes, plan.weights, plan.links
         self._tree = tree
         for array in (self._numbers, self._arms, self._positions, self._quaternions):
-            array.fill(0.0)  # has the system find the memory now, and not in the course of a run
+            array.fill(0.0)  # makes the system allocate the memory now, not during a run
 
     def put_state(self, row: int) -> None:
-        """Keep the last evaluation's numbers as a row."""
+        """Store the numbers of the last evaluation as a row."""
         last = self._evaluation()
         kept = self._numbers, self._status, self._iterations
         recorded_frames.put_state(row, last.numbers, last.status, last.info, *kept)
 
     def put_frame(self, frame: int, poses: mujoco.MjData, spacing: float | None) -> None:
-        """Keep the last evaluation's paths and forces; poses: the data whose poses it saw (`Results.poses`).
+        """Store the paths and forces of the last evaluation; poses: the data with the poses of it (`Results.poses`).
 
-        spacing [m]: as for `Results.polylines`. Frames are put in order.
+        spacing [m]: as for `Results.polylines`. Frames must be stored in order.
         """
         last = self._evaluation()
         points, contacts, forces = self._points, self._contacts, self._forces
@@ -110,10 +110,10 @@ class History:
             self._positions, self._quaternions,
         ):  # fmt: skip
             for store in (points, contacts, forces):
-                store.make_room(frame)
+                store.grow(frame)
 
     def states(self, rows: int) -> dict[str, Array]:
-        """Return what the first `rows` states were, (rows, n) each, by the names that `Results` has for them."""
+        """Return the numbers of the first `rows` states, (rows, n) each, by their names in `Results`."""
         found = {name: self._numbers[:rows, i] for i, name in enumerate(NUMBERS)}
         found["status"] = self._status[:rows].astype(np.float64)
         if self._n:
@@ -127,14 +127,14 @@ class History:
         """Return positions (frames, nbody, 3) [m] and quaternions (frames, nbody, 4) w-x-y-z of the bodies."""
         return self._positions[:frames], self._quaternions[:frames]
 
-    def polylines(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints, Ints]:
+    def polylines(self, frames: int, pool: BufferPool | None = None) -> tuple[Singles, Ints, Ints]:
         """Return the paths of the first frames: points (m, 3) [m], sizes (S,) and counts (n, frames) of strips.
 
-        A pulley parts a muscle's path into several strips. They come by muscle, then by frame; sizes says how many
-        points each has, counts how many strips a muscle has in a frame: none where no path was found yet.
+        A pulley divides a muscle's path into several strips. They are sorted by muscle, then by frame. sizes: number of
+        points of each strip; counts: number of strips of a muscle in a frame, 0 if no path was found yet.
         """
         store, routes = self._points, self._plan[0]
-        out, counts = self._room(room, "points", store, frames)
+        out, counts = self._arrays(pool, "points", store, frames)
         sizes = np.empty(len(routes) * frames, dtype=np.int64)
         first = np.searchsorted(
             routes[:, muscle_paths.R_MUSCLE], np.arange(len(counts) + 1)
@@ -144,30 +144,32 @@ class History:
         count = recorded_frames.list_strips(store.starts, routes, sizes, counts)
         return out, sizes[:count], counts
 
-    def contacts(self, frames: int, room: Room | None = None) -> tuple[Singles, Ints]:
-        """Return the contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
+    def contacts(self, frames: int, pool: BufferPool | None = None) -> tuple[Singles, Ints]:
+        """Return contact points, P and Q in turn, by muscle, then frame: points (m, 3) [m], counts (n, frames)."""
         store = self._contacts
-        out, counts = self._room(room, "contacts", store, frames)
+        out, counts = self._arrays(pool, "contacts", store, frames)
         recorded_frames.gather(store.rows, store.starts, self._where, out, counts)
         return out, counts
 
-    def arrows(self, frames: int, scale: float, room: Room | None = None) -> tuple[Singles, Singles, Ints]:
+    def arrows(
+        self, frames: int, scale: float, pool: BufferPool | None = None
+    ) -> tuple[Singles, Singles, Ints]:
         """Return the forces on bodies as arrows, by muscle, then frame: tails, vectors (m, 3) [m], counts (n, frames).
 
-        A vector is `scale` [m/N] times the force, world frame. Pulls start at the origin and at the insertion; what
-        presses a surface or a via point, the sum over the contact, ends midway between the contact points.
+        A vector is `scale` [m/N] times the force, in the world frame. The forces on origin and insertion start there.
+        The force on a surface or via point, the sum over the contact, ends midway between the contact points.
         """
         store = self._forces
-        tails, counts = self._room(room, "tails", store, frames)
-        vectors, _ = self._room(room, "vectors", store, frames)
+        tails, counts = self._arrays(pool, "tails", store, frames)
+        vectors, _ = self._arrays(pool, "vectors", store, frames)
         recorded_frames.gather_arrows(
             store.rows, store.starts, self._where, float(scale), tails, vectors, counts
         )
         return tails, vectors, counts
 
-    def _room(self, room: Room | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
-        """Return room for the points of a store's first frames in another order, and for their counts."""
-        points = (room or Room()).array(name, (store.count(frames), 3), np.float32)
+    def _arrays(self, pool: BufferPool | None, name: str, store: Store, frames: int) -> tuple[Singles, Ints]:
+        """Return arrays for the points of a store's first frames in another order, and for their counts."""
+        points = (pool or BufferPool()).array(name, (store.count(frames), 3), np.float32)
         return points, np.empty((self._n, frames), dtype=np.int64)
 
     def moment_arms(self, frames: int) -> Array:

@@ -1,7 +1,7 @@
-"""`MuscleSystem`: drives the muscles of a model step by step; only this module reads and writes mjData.
+"""`MuscleSystem`: drives the muscles of a model step by step.
 
-Forces belong to the state at which they act, at every stage of the integrator. So `step` evaluates the muscles between
-MuJoCo's position and acceleration stages, and under RK4 in a control callback that lives only as long as the step.
+Forces must belong to the state at which they act, at every stage of the integrator. So `step` evaluates the muscles
+between MuJoCo's position and acceleration stages, and under RK4 in a control callback that is set only during the step.
 """
 
 from __future__ import annotations
@@ -29,40 +29,41 @@ _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 
 
 class MuscleSystem(Evaluator):
-    """Every muscle that a model declares, driven along geodesic paths.
+    """Drive every muscle that a model declares along its geodesic path.
 
-    model: an `MjModel`; its muscle actuators that mjwrap takes over keep their activation dynamics but pull no more
-    (`actuator_forcerange` is set to zero until `release`). strict: raise `PathError` where a path cannot be found,
-    instead of holding the muscle's last good force for that step. Raises `ModelError` for declarations that cannot be
-    understood. Results (`length`, `velocity`, `tension`, `activation`, `status`, each (n,)) are those of the last
-    `forward`, `apply` or `step`, at the state at which its forces acted. SI units; lengthening and tension positive.
+    model: an `MjModel`. Muscle actuators that mjwrap takes over keep their activation dynamics but no longer pull:
+    their `actuator_forcerange` is zero until `release`. strict: raise `PathError` if a path cannot be found; otherwise
+    the muscle keeps its last valid force for that step. Raises `ModelError` if a declaration is wrong. The results
+    `length`, `velocity`, `tension`, `activation` and `status`, each (n,), are those of the last `forward`, `apply` or
+    `step`, at the state at which the forces acted. SI units; lengthening and tension are positive.
     """
 
     def forward(self, data: mujoco.MjData) -> None:
-        """Compute paths, lengths, velocities and tensions of the present qpos, qvel, act and ctrl.
+        """Compute paths, lengths, velocities and tensions at the present qpos, qvel, act and ctrl.
 
-        Writes nothing to `data`, and needs no derived quantity of it to be up to date. A fibre length of 0, as
-        `mj_resetData` leaves it, stands for static equilibrium.
+        Writes nothing to `data`; its derived quantities need not be up to date. A fibre length of 0, as after
+        `mj_resetData`, means static equilibrium.
         """
         state = self._state(data)
         self._evaluate(state, self._refresh(state, data), data)
 
     def poses(self, data: mujoco.MjData) -> mujoco.MjData:
-        """Return the data whose `xpos` and `xquat` the results belong to.
+        """Return the data with the `xpos` and `xquat` at which the results were computed.
 
-        That is `data` itself after `step`, and a copy of ours after `forward` and `apply`, where `data` may lag.
+        That is `data` itself after `step`. After `forward` and `apply` it is an internal copy, because the derived
+        quantities of `data` may be one step old.
         """
         state = self._state(data)
         return state.scratch if state.in_scratch else data
 
     def apply(self, data: mujoco.MjData) -> None:
-        """Do `forward`, then put the wrenches into `data.xfrc_applied`, beside what others have there.
+        """Call `forward`, then add the muscles' wrenches to `data.xfrc_applied`.
 
-        The last call's contribution is taken back first. Right for one following `mj_step` with an Euler or implicit
-        integrator; under RK4 use `step`, which evaluates at every stage. Others may add to `xfrc_applied` or set all
-        of it between calls; who assigns changing forces to single rows should use `step`, which leaves theirs alone.
-        The tensions are those for one time step from here (elastic tendons: at its end). The states that mjwrap
-        integrates itself stay as they are: `advance` brings them to the end of the step.
+        The wrenches that the previous call added are removed first. Call it once before each `mj_step` with an Euler or
+        implicit integrator; under RK4 use `step`, which evaluates the muscles at every stage. Between calls other code
+        may add forces to `xfrc_applied` or set the whole array; code that assigns changing forces to single rows should
+        use `step`, which does not touch them. The tensions are those for the coming time step (with an elastic tendon:
+        at its end). The states that mjwrap integrates itself do not change: `advance` integrates them.
         """
         state = self._state(data)
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
@@ -73,15 +74,15 @@ class MuscleSystem(Evaluator):
         )
 
     def advance(self, data: mujoco.MjData) -> None:
-        """Bring the states that mjwrap integrates itself to the end of the step for which `apply` put its forces in.
+        """Integrate the states that mjwrap keeps to the end of the step for which `apply` computed the forces.
 
-        For a loop of `apply`, `mj_step`, `advance`; `step` does all three. They are the activation and fibre length in
-        `data.act` of actuators with dyntype="user" actdim="2", and those of muscles without an actuator. `StateError`
-        where no step follows an `apply`.
+        For loops of `apply`, `mj_step` and `advance`; `step` does all three. These states are the activation and fibre
+        length in `data.act` of actuators with dyntype="user" actdim="2", and those of muscles without an actuator.
+        Raises `StateError` unless `apply` and `mj_step` came before.
         """
         state = self._state(data)
         if state.applied is None or not data.time > state.applied:
-            raise StateError("nothing to advance: call apply, then mj_step, then advance")
+            raise StateError("no step to advance: call apply, then mj_step, then advance")
         self._store(state, data)
 
     def _store(self, state: State, data: mujoco.MjData) -> None:
@@ -92,7 +93,7 @@ class MuscleSystem(Evaluator):
         )
 
     def length_jacobian(self, data: mujoco.MjData) -> Array:
-        """Return ∂l/∂q (n, nv), the sign of MuJoCo's ten_J, at the present qpos; does a `forward` first."""
+        """Return ∂l/∂q (n, nv) at the present qpos, with the sign of MuJoCo's ten_J; calls `forward` first."""
         self.forward(data)
         state, plan = self._last, self._plan
         jacobian = np.zeros((plan.n, self.model.nv))
@@ -104,10 +105,10 @@ class MuscleSystem(Evaluator):
         return jacobian
 
     def length_jacobian_rate(self, data: mujoco.MjData, direction: ArrayLike | None = None) -> Array:
-        """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), or along qvel where None.
+        """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), by default along qvel.
 
-        Times qvel it is what the acceleration of the lengths has beside ∂l/∂q qacc. Does a `forward` first. Raises
-        `PathError` naming a muscle without a path, `GeometryError` where the path has no second derivative.
+        The acceleration of the lengths is this rate times qvel, plus ∂l/∂q qacc. Calls `forward` first. Raises
+        `PathError` if a muscle has no path, `GeometryError` if a path has no second derivative.
         """
         self.forward(data)
         return length_jacobian_rate(self, self._last, direction)
@@ -115,11 +116,12 @@ class MuscleSystem(Evaluator):
     def energetics(
         self, metabolism: Umberger2010 | Sequence[Umberger2010 | None] | None = None
     ) -> Energetics:
-        """Return powers, stored energies and, with `metabolism`, metabolic cost of all muscles at the last evaluation.
+        """Return power, stored energy and, with `metabolism`, metabolic cost of all muscles at the last evaluation.
 
-        metabolism: one model for all muscles, or one each. Muscles that are `held` there, and those switched off, have
-        zeros; `StateError` before the first evaluation. With an elastic tendon they are those of the state there,
-        whose tendon force the `tension` of a step, which is the one at its end, leaves by the first order of the step.
+        metabolism: one model for all muscles, or one for each. The values are zero for muscles that are `held` or
+        switched off. With an elastic tendon they belong to the state at the start of the step, but `tension` to its
+        end; the two tendon forces differ in proportion to the time step. Raises `StateError` before the first
+        evaluation.
         """
         plan, state = self._plan, self._last
         if not state.evaluated:
@@ -137,8 +139,8 @@ class MuscleSystem(Evaluator):
     def step(self, data: mujoco.MjData, nstep: int = 1) -> None:
         """Advance the simulation by `nstep` time steps with the muscles' forces at every stage of the integrator.
 
-        Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds other people's contributions only.
-        Raises `StateError` for a state that is not finite, and where MuJoCo finds the motion unstable and resets it.
+        Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds only the forces of other code.
+        Raises `StateError` if the state is not finite, or if MuJoCo resets it because the motion became unstable.
         """
         if nstep < 0:
             raise StateError(f"nstep must not be negative, got {nstep}")
@@ -167,7 +169,7 @@ class MuscleSystem(Evaluator):
             )
 
     def _act(self, state: State, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0) -> None:
-        """Evaluate at the present stage of `data`, whose kinematics are fresh, and put the wrenches in."""
+        """Evaluate at the present stage of `data`, whose kinematics are up to date, and add the wrenches."""
         self._evaluate(state, data, data, since, ahead)
         wrenches.add_to_xfrc(
             data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench
@@ -177,7 +179,7 @@ class MuscleSystem(Evaluator):
         wrenches.remove_from_xfrc(data.xfrc_applied, state.others, state.mine, state.total, state.written)
 
     def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> None:
-        """Runge-Kutta: act in MuJoCo's control callback, which it calls at every stage."""
+        """Step under Runge-Kutta: add the wrenches in MuJoCo's control callback, which runs at every stage."""
         start, half = data.time, 0.5 * self.model.opt.timestep
         before, acted = resets(data), False
         failed = np.zeros(self._plan.n, dtype=np.bool_)
@@ -188,11 +190,13 @@ class MuscleSystem(Evaluator):
             if caught:
                 return
             try:
-                # stages are at half steps; the time itself is rounded
+                # a stage is at a multiple of half a step; data.time is rounded
                 self._act(state, data, since=half * round((data.time - start) / half))
                 np.logical_or(failed, state.status != 0, out=failed)
                 acted = True
-            except Exception as error:  # an exception must not cross MuJoCo's C frames; it is raised below
+            except (
+                Exception
+            ) as error:  # an exception must not pass through MuJoCo's C code; it is raised below
                 caught.append(error)
 
         with control_callback(data, act, lambda: self._take_back(state, data)):
@@ -209,9 +213,9 @@ class MuscleSystem(Evaluator):
                     self._store(state, data)
 
     def reset(self, data: mujoco.MjData | None = None) -> None:
-        """Forget branches, warm starts and last forces, after `mj_resetData` or a jump of qpos.
+        """Forget branches, warm starts and last forces. Call it after `mj_resetData` or a jump of qpos.
 
-        What mjwrap had put into `data.xfrc_applied` and is still there is taken out. None resets all known data.
+        Forces of mjwrap that are still in `data.xfrc_applied` are removed. None resets every data seen so far.
         """
         if data is None:
             for state in self._states.values():
@@ -223,16 +227,16 @@ class MuscleSystem(Evaluator):
         self._last.forget()
 
     def branch(self, data: mujoco.MjData) -> Array:
-        """Return the branches of all paths, (k,): side, winding and warm start of every obstacle.
+        """Return the branches of all paths (k,): side, winding and warm start of every obstacle.
 
-        MuJoCo saves poses, velocities and `act`, but not these: with them too (`set_branch`), a restored simulation
-        goes on with the same bits as one that never stopped.
+        MuJoCo saves poses, velocities and `act`, but not these. If they are restored too (`set_branch`), a restored
+        simulation continues to the last bit as if it had never stopped.
         """
         state = self._state(data)
         return np.append(state.node[:, layout.S_MODE : layout.S_MODE + layout.STATE], state.own)
 
     def set_branch(self, data: mujoco.MjData, branch: ArrayLike) -> None:
-        """Restore what `branch` returned, perhaps for another MjData of the model; `StateError` for another size."""
+        """Restore what `branch` returned, also for another MjData of the model; `StateError` if its size is wrong."""
         state = self._state(data)
         given, rows = np.asarray(branch, dtype=np.float64), state.node[:, layout.S_MODE :][:, : layout.STATE]
         if given.shape != (rows.size + state.own.size,):
@@ -243,5 +247,5 @@ class MuscleSystem(Evaluator):
         state.own[:] = given[rows.size :].reshape(state.own.shape)
 
     def release(self) -> None:
-        """Give the native actuators their forces back, as they were; this MuscleSystem can evaluate no more."""
+        """Restore the forces of the native actuators. This MuscleSystem cannot be used afterwards."""
         self._takeover.release()

@@ -1,4 +1,4 @@
-"""Gives the results of an evaluation: numbers of each muscle, and its path in space."""
+"""The results of an evaluation: the numbers of each muscle, and its path in space."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Array = NDArray[np.float64]
 
 
 class Results:
-    """Lengths, velocities, tensions, statuses and paths at the last evaluation, as copies that stay as they are.
+    """Lengths, velocities, tensions, statuses and paths at the last evaluation, as copies.
 
-    declarations: what the model declares, one per muscle; native: muscle actuators that stay with MuJoCo, and why.
+    declarations: the declaration of each muscle; native: muscle actuators that stay with MuJoCo, with the reasons.
     """
 
     def __init__(self, found: Declarations, plan: Plan, model: mujoco.MjModel, last: Evaluation) -> None:
@@ -42,7 +42,7 @@ class Results:
         )
 
     def _evaluation(self) -> Evaluation:
-        """Return what was last evaluated, as it is: not a copy."""
+        """Return the last evaluation itself, not a copy."""
         return self._last
 
     @property
@@ -77,7 +77,7 @@ class Results:
 
     @property
     def fiber_length(self) -> Array:
-        """Fibre lengths (n,) [m], 0 for a law without fibres; along the fibre, so longer than its reach if pennate."""
+        """Fibre lengths (n,) [m], measured along the (pennate) fibre; 0 for a law without fibres."""
         return self._evaluation().fiber.copy()
 
     @property
@@ -87,9 +87,9 @@ class Results:
 
     @property
     def held(self) -> NDArray[np.bool_]:
-        """Whether each muscle (n,) keeps its last good length, velocity and tension, for want of a path.
+        """Whether each muscle (n,) has no path and keeps its last valid length, velocity and tension.
 
-        False where it has a path, and where an end lies inside a surface but the length goes on from the surface.
+        False also if an end lies inside a surface but the length is continued from the surface.
         """
         status, error = self._evaluation().status, self.tangency_error
         return (status != Status.CONVERGED) & (
@@ -98,13 +98,13 @@ class Results:
 
     @property
     def iterations(self) -> NDArray[np.int64]:
-        """Iterations (n,) that the search for the paths took, those of all routes of a muscle together."""
+        """Iterations (n,) of the search for the paths, summed over all routes of a muscle."""
         counts = self._evaluation().info[:, layout.I_ITERATIONS]
         return np.bincount(self._plan.routes[:, muscle_paths.R_MUSCLE], counts, self.n).astype(np.int64)
 
     @property
     def tangency_error(self) -> Array:
-        """Tangency errors (n,): the largest of each muscle's routes, 0 where it touches no surface."""
+        """Tangency errors (n,), the largest of each muscle's routes; 0 if it touches no surface."""
         found = np.zeros(self.n)
         errors = self._evaluation().info[:, layout.I_ERROR]
         np.maximum.at(found, self._plan.routes[:, muscle_paths.R_MUSCLE], errors)
@@ -112,33 +112,34 @@ class Results:
 
     @property
     def time(self) -> float:
-        """Simulation time [s] to which all results belong."""
+        """Simulation time [s] of all results."""
         return self._evaluation().time
 
     @property
     def failures(self) -> NDArray[np.int64]:
-        """Number of steps (n,) at which a muscle had no path, whether its force was held or not."""
+        """Number of steps (n,) at which a muscle had no path."""
         return self._evaluation().failures.copy()
 
     def index(self, name: str) -> int:
-        """Return the index of a muscle by name; `GeometryError` lists the names where there is no such muscle."""
+        """Return the index of a muscle by name; `GeometryError`, which lists the names, if there is no such muscle."""
         if name not in self.names:
             raise GeometryError(f"no muscle '{name}'; muscles: {', '.join(self.names) or 'none'}")
         return self.names.index(name)
 
     def reason(self, i: int) -> str:
-        """Return why muscle i last had no path, with the elements at fault; empty if it always had one."""
+        """Return why muscle i last had no path, naming the elements; empty if it always had one."""
         code = int(self._evaluation().last_failure[i])
         detail = self._evaluation().details[i]
         return (Status(code).message + (f" ({detail})" if detail else "")) if code else ""
 
     def report(self) -> str:
-        """Return one line per muscle whose path was not found on some steps, with the reason; empty if none."""
+        """Return a line for each muscle that had no path at some steps, with the last reason; empty if none."""
         lines = []
         for i, count in enumerate(self.failures):
             if count:
                 lines.append(
-                    f"{self.names[i]}: {count} step{'s' if count != 1 else ''} without a path; at last {self.reason(i)}"
+                    f"{self.names[i]}: {count} step{'s' if count != 1 else ''} without a path; "
+                    f"last reason: {self.reason(i)}"
                 )
         return "\n".join(lines)
 
@@ -169,21 +170,21 @@ class Results:
     def points(self, i: int, spacing: float | None = None) -> Array:
         """Return the polyline of muscle i, (m, 3), world [m], at the last evaluation; empty before the first.
 
-        spacing [m]: largest distance between points; None: as many as the curvature asks for. Between routes
-        joined by pulleys is a row of NaN, so that a plot has no line there. A muscle whose path was not found is drawn
-        along the force that it holds.
+        spacing [m]: largest distance between points; None: chosen by the curvature. A row of NaN separates routes that
+        pulleys join, so that a plot has no line between them. A muscle without a path is drawn along its last valid
+        path. If an end lies inside a surface, the drawing starts at that end.
         """
         return self._polylines(spacing, self._known(i))[0]
 
     def polylines(self, spacing: float | None = None) -> tuple[Array, NDArray[np.int64]]:
         """Return the polylines of all muscles: points (m, 3), starts (n + 1,); muscle i has starts[i]:starts[i + 1].
 
-        A row of NaN stands between routes of a muscle that are joined by pulleys.
+        A row of NaN separates routes of a muscle that pulleys join.
         """
         return self._polylines(spacing, -1)
 
     def contact_points(self, i: int) -> Array:
-        """Return first and last contact point, (k, 2, 3), world [m], of every obstacle that muscle i touches."""
+        """Return the first and last contact point (k, 2, 3) of every obstacle that muscle i touches, world [m]."""
         return self._contacts(self._known(i))[0].reshape(-1, 2, 3)
 
     def contacts(self) -> tuple[Array, NDArray[np.int64]]:
@@ -191,13 +192,13 @@ class Results:
         return self._contacts(-1)
 
     def poses(self, data: mujoco.MjData) -> mujoco.MjData:
-        """Return the data whose kinematics the results belong to: `data` itself."""
+        """Return the data with the poses at which the results were computed: `data` itself."""
         return data
 
     def history(
         self, rows: int, muscles: NDArray[np.int64] | None = None, dofs: NDArray[np.int64] | None = None
     ) -> History:
-        """Return room for `rows` states and frames of the muscles, with the moment arms of pairs (muscles, dofs)."""
+        """Return storage for `rows` states and frames of the muscles, with the moment arms of pairs (muscles, dofs)."""
         tree = self._last_dof, self._dofs[2], self._root
         return History(self.model, self._plan, tree, self._evaluation, rows, muscles, dofs)
 

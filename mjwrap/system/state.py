@@ -1,4 +1,4 @@
-"""Holds what belongs to one mjData: results, warm starts, and what was added to its xfrc_applied."""
+"""The results, warm starts and applied forces of one mjData."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ NUMBERS = (
     "length",
     "velocity",
     "tension",
-)  # of every muscle, as `Results` names them
+)  # the numbers of every muscle, named as in `Results`
 
 
 class Evaluation:
-    """What one evaluation of all muscles leaves: paths, states and tensions, as the kernels write them."""
+    """The results of one evaluation of all muscles: paths, states and tensions, as the kernels write them."""
 
     def __init__(self, n: int, node: NDArray[np.float64], routes: int) -> None:
         self.node = node
@@ -35,13 +35,13 @@ class Evaluation:
         self.status = np.zeros(n, dtype=np.int64)
         self.failures = np.zeros(n, dtype=np.int64)
         self.last_failure = np.zeros(n, dtype=np.int64)
-        self.details = [""] * n  # which elements are to blame for the last failure
+        self.details = [""] * n  # elements that caused the last failure
         self.time = 0.0
         self.evaluated = False
 
 
 class State(Evaluation):
-    """What belongs to one mjData: an evaluation, warm starts, and what was added to its xfrc_applied."""
+    """The state of one mjData: an evaluation, warm starts, and the forces added to its xfrc_applied."""
 
     def __init__(self, model: mujoco.MjModel, plan: Plan) -> None:
         n = plan.n
@@ -56,11 +56,13 @@ class State(Evaluation):
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)
         self.scratch = mujoco.MjData(model)
-        self.applied: float | None = None  # time of an `apply` whose states are still to be advanced
-        self.in_scratch = False  # whether the last evaluation read its poses there, or in the caller's data
+        self.applied: float | None = None  # time of an `apply` that `advance` has not followed yet
+        self.in_scratch = (
+            False  # whether the last evaluation took its poses from there, not from the caller's data
+        )
 
     def forget(self) -> None:
-        """Start cold: no branch, no last force, no failures."""
+        """Reset: no branch, no last force, no failures."""
         self.node[:, layout.S_MODE] = layout.COLD
         self.count[:] = 0
         self.numbers[:], self.own[:] = 0.0, 0.0

@@ -1,1 +1,1 @@
-"""Independent judges of paths, without the solver's code, for tests and benchmarks."""
+"""Independent tests of paths, without the solver's code, for tests and benchmarks."""

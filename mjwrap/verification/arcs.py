@@ -1,4 +1,4 @@
-"""Geodesics of every shape with their Jacobi fields, with methods other than the package's.
+"""Geodesics of every shape with their Jacobi fields, by methods that differ from those of the package.
 
 Closed forms if the surface can be unrolled or is round; otherwise Gauss-Legendre collocation of p'' = -(t.Ht /
 |g|^2) g in the embedding space (g, H: gradient and Hessian of the defining function), for a thousand arcs at
@@ -30,20 +30,20 @@ from mjwrap.verification.shapes import (
 )
 
 STAGES = 8  # order 16
-TURN = 1.0  # of the direction within one step, at most [rad]
-ITERATIONS = 25  # of the fixed point within one step: what is left shrinks like TURN^k / k!
-HALVINGS = 3  # of the steps where they prove too long
-DRIFT = 1e-12  # of a tangent's length, and of the end from the surface in radii of curvature
-SAMPLES = 17  # points of a closed form at which it is looked at
+TURN = 1.0  # largest turn of the direction within one step [rad]
+ITERATIONS = 25  # fixed-point iterations within one step; the error decreases like TURN^k / k!
+HALVINGS = 3  # number of times that too long steps are halved
+DRIFT = 1e-12  # largest error of a tangent's length, and of the end's distance from the surface in radii of curvature
+SAMPLES = 17  # number of points at which a closed form is evaluated
 
 
 @dataclass
 class Arcs:
     """Geodesics (m) from P along t over s, in the surface's frame.
 
-    Q, t (m, 3): where they end; jacobi (m, 4): a, a', r, r' at the end (docs/derivation.md, how a geodesic moves);
-    bending (m): smallest normal curvature along them [1/m]; spread (m): smallest r(x) / x along them, positive before
-    a conjugate point; reach (m): largest |z| [m]; points, tangents (m, k, 3): on the way, at arc lengths x (m, k).
+    Q, t (m, 3): end points and tangents there; jacobi (m, 4): a, a', r, r' at the end (docs/derivation.md, how a
+    geodesic moves); bending (m): smallest normal curvature along them [1/m]; spread (m): smallest r(x) / x along them,
+    positive before a conjugate point; reach (m): largest |z| [m]; points, tangents (m, k, 3): at arc lengths x (m, k).
     """
 
     Q: Array
@@ -95,7 +95,7 @@ def _listed(
 
 
 def _sphere(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tuple, tuple]:
-    """Great circles."""
+    """Return great circles."""
     radius = d[..., 0]
     c, s = np.cos(x / radius), np.sin(x / radius)
     points = c[..., None] * P + (s * radius)[..., None] * t
@@ -111,7 +111,7 @@ def _turned(v: Array, angle: Array) -> Array:
 
 
 def _cylinder(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tuple, tuple]:
-    """Helices."""
+    """Return helices."""
     radius = d[..., 0]
     angle = x * (P[..., 0] * t[..., 1] - P[..., 1] * t[..., 0]) / radius**2
     points = _turned(P, angle)
@@ -121,11 +121,11 @@ def _cylinder(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tup
 
 
 def _cone(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tuple, tuple]:
-    """Straight lines of the unrolled cone, in polar coordinates about the apex."""
+    """Return straight lines of the unrolled cone, in polar coordinates about the apex."""
     apex = np.zeros_like(P)
     apex[..., 2] = Cone().apex(d)
     slant = np.linalg.norm(P - apex, axis=-1)
-    sine = np.hypot(P[..., 0], P[..., 1]) / slant  # of the angle between generators and axis
+    sine = np.hypot(P[..., 0], P[..., 1]) / slant  # cosine and sine of the angle between generators and axis
     cosine = (P - apex)[..., 2] / slant
     out = dot(t, (P - apex) / slant[..., None])
     around = (P[..., 0] * t[..., 1] - P[..., 1] * t[..., 0]) / (sine * slant)
@@ -148,7 +148,7 @@ def _cone(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tuple, 
 
 
 def _piece(d: Array, P: Array, t: Array, left: float) -> tuple[Any, float]:
-    """Return on which part of a capsule an arc runs on (0: cylinder, else the sign of the cap) and how far."""
+    """Return the part of a capsule on which an arc continues (0: cylinder, else the sign of the cap), and how far."""
     radius, half = d
     z, rise = P[2], t[2]
     slack = 1e-14 * (half + radius)
@@ -164,7 +164,7 @@ def _piece(d: Array, P: Array, t: Array, left: float) -> tuple[Any, float]:
 
 
 def _capsules(shape: Shape, d: Array, P: Array, t: Array, s: Array) -> Arcs:
-    """Great circles and helices in turn, one arc after another."""
+    """Return great circles and helices in turn, one arc after another."""
     points, tangents, fields = [], [], []
     x = s[:, None] * np.linspace(0.0, 1.0, 4 * SAMPLES)
     for k in range(len(s)):
@@ -224,7 +224,7 @@ def _collocated(shape: Shape, d: Array, P: Array, t: Array, s: Array) -> Arcs:
         power = need[need >= 0].min()
         group = np.flatnonzero(need == power)
         arcs = _steps(shape, d[group], P[group], t[group], s[group], 2**power)
-        # nothing in the equation holds tangents at length one or points on the surface but accuracy
+        # only accuracy keeps tangents at unit length and points on the surface
         drift = np.maximum(
             np.abs(dot(arcs.t, arcs.t) - 1.0), np.abs(shape.level(d[group], arcs.Q)) * shape.bend(d[group])
         )
@@ -240,7 +240,7 @@ def _collocated(shape: Shape, d: Array, P: Array, t: Array, s: Array) -> Arcs:
         parts = []
         for _, arcs in done:
             value = getattr(arcs, name)
-            if name in ("points", "tangents", "x"):  # short ones repeat their last point
+            if name in ("points", "tangents", "x"):  # short arcs repeat their last point
                 value = np.concatenate([value, np.repeat(value[:, -1:], most - value.shape[1], axis=1)], 1)
             parts.append(value)
         return np.concatenate(parts)[order]
@@ -313,7 +313,7 @@ def slow_arc(surface: Surface, P: Array, t: Array, s: float) -> tuple[Array, Arr
         )
 
     scale = 1e-13 * np.array([s + 1e-3] * 3 + [1.0] * 3 + [1.0, 1.0 / (s + 1e-3), s + 1e-3, 1.0])
-    # a capsule's curvature jumps where its half spheres begin: steps end there
+    # a capsule's curvature jumps where its half spheres begin, so steps end there
     seams = [lambda _, y, z=z: y[2] - z for z in (-d[-1], d[-1])] if isinstance(shape, Capsule) else []
     for seam in seams:
         seam.terminal = True  # type: ignore[attr-defined]
@@ -321,7 +321,7 @@ def slow_arc(surface: Surface, P: Array, t: Array, s: float) -> tuple[Array, Arr
     while where < s:
         run = solve_ivp(rates, (where, s), y, "DOP853", rtol=1e-13, atol=scale, events=seams or None)
         y = run.y[:, -1]
-        nudge = min(1e-12, s - run.t[-1])  # past the seam
+        nudge = min(1e-12, s - run.t[-1])  # beyond the seam
         y = y + nudge * rates(0.0, y)
         where = run.t[-1] + nudge if nudge > 0.0 else s
     return y[:3], y[3:6], y[6:]

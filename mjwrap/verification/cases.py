@@ -1,4 +1,4 @@
-"""Scenes as plain numbers: saved by robustness.py and motion.py, and replayed."""
+"""Scenes as plain numbers: robustness.py and motion.py save and replay them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mjwrap.verification.shapes import Array
 
 
 def plain(value: Any) -> Any:
-    """Return arrays, tuples and NumPy numbers as lists and Python numbers, all of their digits kept."""
+    """Convert arrays, tuples and NumPy numbers to lists and Python numbers, with all digits."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
@@ -52,7 +52,7 @@ def restore(scene: dict[str, Any]) -> tuple[Array, Array, list[mw.Obstacle]]:
 
 
 def replay(file: Path, index: int | None) -> None:
-    """Solve saved cases again and print what happens."""
+    """Solve saved cases again and print the results."""
     cases = json.loads(file.read_text(encoding="utf-8"))
     for number in range(len(cases)) if index is None else [index]:
         case = cases[number]
@@ -66,7 +66,7 @@ def replay(file: Path, index: int | None) -> None:
             print(f"    {obstacle.surface}{hint}: arc {contact.arc_length:.6g}{second} m")
         found = Case.of(origin, insertion, obstacles, sol)
         reason = findings([found])[0]
-        print(f"  judge: {reason or 'nothing against it'}")
+        print(f"  judge: {reason or 'no fault found'}")
         free = [dataclasses.replace(obstacle, hint=None) for obstacle in obstacles]
         best = shortest(origin, insertion, free, np.random.default_rng(0), None if reason else found)
         if best is not None:

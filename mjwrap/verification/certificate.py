@@ -1,9 +1,8 @@
-"""An independent judge of paths: tests a solution from its contact points and arc lengths alone.
+"""An independent judge of paths: it tests a solution from its contact points and arc lengths alone.
 
 The path of a taut string touches each of its surfaces along a geodesic that bends towards the surface everywhere. It
-meets and leaves the surface tangentially, does not enter a surface between whose neighbours it lies, and is a local
-minimum of length. `findings` tests a thousand paths at once, with the geometry of `shapes` and the geodesics of
-`arcs`.
+meets and leaves the surface tangentially, does not pass below a surface, and is a local minimum of length. `findings`
+tests a thousand paths at once, with the geometry of `shapes` and the geodesics of `arcs`.
 """
 
 from __future__ import annotations
@@ -17,18 +16,18 @@ import numpy as np
 
 import mjwrap as mw
 from mjwrap.verification.arcs import Arcs, arcs_of
-from mjwrap.verification.shapes import SHAPES, Array, Ints, Shape, beside, half_length, sizes
+from mjwrap.verification.shapes import SHAPES, Array, Ints, Shape, half_length, orthogonal_unit, sizes
 
 ON_SURFACE = 1e-12  # distance of contact points from their surface, a hundred roundings of 0.1 m [m]
 DIRECTION = 1e-8  # sine of the angle between a segment and its geodesic; the solver asks for 1e-10
 LANDING = 1e-9  # distance between Q and the end of the geodesic from P; 1e-10 rad over the arcs here makes 1e-11 [m]
 SUM = 1e-13  # relative: total length against the sum of its parts
 ENTERING = 1e-12  # depth of a straight segment below a surface [m]
-LIFTING = 1e-9  # negative normal curvature, as a share of the largest
-SLIPPING = 1e-9  # negative stiffness against sideways shifts, as a share of the largest
-SHORT = 1e-6  # a segment this short has a direction that may miss over an arc [m]
-ROUNDING = 1e-15  # of a point [m]: a segment this short has no direction
-SEGMENT_SAMPLES = 257  # along a straight segment beside a surface that is not convex
+LIFTING = 1e-9  # negative normal curvature, relative to the largest
+SLIPPING = 1e-9  # negative stiffness against sideways shifts, relative to the largest
+SHORT = 1e-6  # the direction of a shorter segment is too inaccurate for the arc after it [m]
+ROUNDING = 1e-15  # rounding error of a point [m]: a shorter segment has no direction
+SEGMENT_SAMPLES = 257  # points along a straight segment beside a surface that is not convex
 NARROWING = 60  # golden-section steps between two samples
 
 
@@ -37,9 +36,9 @@ Contacts = list[tuple[Array, Array, float]]
 
 @dataclass
 class Case:
-    """A scene and what is claimed about it: the touches (P, Q, s) of each obstacle, and the length [m].
+    """A scene and the path claimed for it: the touches (P, Q, s) of each obstacle, and the length [m].
 
-    An obstacle has no touch, one, or two where the string bridges a hollow of it.
+    An obstacle has no touch, one touch, or two if the string bridges a hollow of it.
     """
 
     origin: Array
@@ -107,19 +106,19 @@ def rotation(quat: Any) -> Array:
 
 
 class Verdict:
-    """The first thing that speaks against each case, empty where nothing does."""
+    """The first fault found in each case, or an empty string."""
 
     def __init__(self, count: int) -> None:
         self.reasons = [""] * count
 
     def refute(self, case: int, reason: str) -> None:
-        """Note a reason; the first one stays."""
+        """Note a fault, unless the case already has one."""
         if not self.reasons[case]:
             self.reasons[case] = reason
 
 
 def findings(cases: Sequence[Case]) -> list[str]:
-    """Return for each case what speaks against it: '' or a word (folded, penetrating, ...) and the figure."""
+    """Return the fault of each case: '' or a word (folded, penetrating, ...) with its measure."""
     verdict = Verdict(len(cases))
     touches, segments = [], []
     for number, case in enumerate(cases):
@@ -169,14 +168,14 @@ def laid_out(number: int, case: Case) -> tuple[list[Touch], list[tuple[int, int,
 
 
 def _tangent(n: Array, e: Array) -> Array:
-    """Return unit tangents (m, 3) along directions, or any where these are near the normals (m, 3)."""
+    """Return unit tangents (m, 3) along directions; any tangent if a direction is near the normal (m, 3)."""
     t = e - (e * n).sum(1)[:, None] * n
     size = np.linalg.norm(t, axis=1)
-    return np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], beside(n))
+    return np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], orthogonal_unit(n))
 
 
 def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
-    """Return the touches by kind of surface, with the geodesics that arriving segments continue in; fill in frames."""
+    """Return the touches by kind of surface, with the geodesics that continue the arriving segments."""
     kinds: dict[type, list[Touch]] = {}
     for touch in touches:
         obstacle = cases[touch.case].obstacles[touch.index]
@@ -196,11 +195,11 @@ def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
         P, Q, e, e2 = local("P", pos), local("Q", pos), local("arriving", 0.0), local("leaving", 0.0)
         s = np.array([touch.s for touch in found])
         n = shape.normal(d, P)
-        # a segment too short to have a direction hands over to the one behind an arc too short to turn
+        # if a segment is too short to have a direction and the arc too short to turn, the next segment's is used
         blunt = np.array([touch.before < 1e3 * ROUNDING for touch in found])
         e = np.where(blunt[:, None], e2, e)
         t = _tangent(n, e)
-        # a short segment's direction is sure to its rounding only: a longer one behind says where the arc comes from
+        # a short segment's direction is inaccurate by rounding: a longer segment after it gives the arc's direction
         short = np.array([touch.before < min(SHORT, touch.after) for touch in found]) & (~blunt | (s > SHORT))
         if short.any():
             start = -_tangent(shape.normal(d[short], Q[short]), e2[short])
@@ -255,9 +254,9 @@ def _judge_contacts(cases: Sequence[Case], group: Group, verdict: Verdict) -> No
 
 
 def deepest(shape: Shape, d: Array, a: Array, b: Array) -> Array:
-    """Return the lowest level of straight segments from a to b (m, 3) relative to surfaces d (m, k) [m].
+    """Return the smallest level of straight segments from a to b (m, 3) relative to surfaces d (m, k) [m].
 
-    Samples, then golden sections around each that could hide a dip: heights change by at most the way between samples.
+    Heights are sampled, then minimised by golden sections around every sample near which the segment could pass below.
     """
     count = 3 if shape.convex else SEGMENT_SAMPLES
     share = np.linspace(0.0, 1.0, count)

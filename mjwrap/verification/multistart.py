@@ -1,9 +1,9 @@
-"""The shortest taut path that a search without any of the solver's code finds.
+"""Search for the shortest taut path without the solver's code.
 
-One surface: every path (`multistart_single`), and for a torus also those that bridge its hole. Up to FEW
-surfaces: strings laid round them in many ways (`multistart_rows`). Longer rows: in addition every window of
-WINDOW neighbours of a given path is searched again between fixed ends; if a shorter way through it exists,
-the whole path is polished from there. A path counts only if the judge of `certificate.py` accepts it.
+One surface: all paths (`multistart_single`), and for a torus also paths that bridge its hole. Up to FEW surfaces:
+strings laid round them in many ways (`multistart_rows`). Longer rows: in addition every window of WINDOW neighbours of
+a given path is searched again between fixed ends; if there is a shorter path through it, the whole path is polished
+from that one. Only paths that the judge of `certificate.py` accepts are used.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from mjwrap.verification.multistart_single import paths_over_one
 from mjwrap.verification.polish import Touch
 from mjwrap.verification.shapes import Array, unit
 
-FEW = 5  # surfaces whose ways round are tried together
-WINDOW = 3  # neighbours that are searched together in a longer row
+FEW = 5  # number of surfaces whose ways round are tried together
+WINDOW = 3  # number of neighbours that are searched together in a longer row
 WINDOW_STRINGS = 32
-SHORTER = 1e-6  # relative: differences below are none
+SHORTER = 1e-6  # relative: smaller differences are ignored
 
 
 def shortest(
@@ -45,13 +45,13 @@ def shortest(
 
 
 def accepted(cases: Sequence[Case]) -> Case | None:
-    """Return the shortest of some paths that the judge has nothing against."""
+    """Return the shortest of the paths that the judge accepts."""
     good = [case for case, reason in zip(cases, findings(cases), strict=True) if not reason]
     return min(good, key=lambda case: case.length, default=None)
 
 
 def improved(case: Case, rng: np.random.Generator) -> list[Case]:
-    """Return paths that lead a shorter way through some window of a path's row."""
+    """Return paths that are shorter in some window of a path's row."""
     n = len(case.obstacles)
     stops = [(k, P, Q, s) for k, contacts in enumerate(case.contacts) for P, Q, s in contacts]
     found = []

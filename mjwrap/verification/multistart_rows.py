@@ -1,9 +1,9 @@
-"""Taut paths over a row of surfaces: strings laid round them in many ways, pulled tight all at once, then polished.
+"""Find taut paths over a row of surfaces: strings laid round them in many ways, pulled tight together, then polished.
 
-A string is a polyline with NODES nodes from one obstacle to the next. It is laid through one waypoint beside
-each obstacle (either side of long ones, several directions round others, a torus' hole, or none), smoothed by
-an implicit step of its own tension and pushed out of the surfaces, over and over. Where its nodes touch at the
-end is a rough path for `polish`.
+A string is a polyline with NODES nodes from one obstacle to the next. It is laid through one waypoint beside each
+obstacle (either side of long ones, several directions round others, the hole of a torus, or none). Then it is
+repeatedly smoothed by an implicit step of its tension and pushed out of the surfaces. The nodes that touch at the end
+give a rough path for `polish`.
 """
 
 from __future__ import annotations
@@ -18,21 +18,32 @@ import mjwrap as mw
 from mjwrap.surfaces import Surface
 from mjwrap.verification.certificate import ENTERING, Case, deepest, rotation
 from mjwrap.verification.polish import Touch, polish
-from mjwrap.verification.shapes import SHAPES, Array, Ellipsoid, Ints, Shape, Torus, beside, dot, sizes, unit
+from mjwrap.verification.shapes import (
+    SHAPES,
+    Array,
+    Ellipsoid,
+    Ints,
+    Shape,
+    Torus,
+    dot,
+    orthogonal_unit,
+    sizes,
+    unit,
+)
 
-NODES = 10  # from one obstacle to the next
+NODES = 10  # nodes from one obstacle to the next
 PULLS = (
     (40.0, 30),
     (10.0, 40),
     (3.0, 40),
     (1.0, 40),
     (0.2, 40),
-)  # strengths of the implicit step, in nodes squared, and how often
-WINDOW = 25  # nodes on either side of an obstacle that it may push
-STRINGS = 96  # pulled at once
-POLISHED = 5  # of the shortest strings that differ
-REPAIRS = 3  # rounds of taking in what a polished path enters
-SAME = 1e-3  # relative: strings whose lengths differ by less and that touch alike are one
+)  # (strength of the implicit step in nodes squared, number of steps)
+WINDOW = 25  # number of nodes on either side of an obstacle that it may push
+STRINGS = 96  # number of strings pulled together
+POLISHED = 5  # number of the shortest different strings that are polished
+REPAIRS = 3  # rounds of adding surfaces that a polished path enters
+SAME = 1e-3  # relative: strings with a smaller difference of length and the same touches count as equal
 
 
 def ways_round(surface: Surface, quat: Sequence[float], along: Array) -> list[Array]:
@@ -49,7 +60,7 @@ def ways_round(surface: Surface, quat: Sequence[float], along: Array) -> list[Ar
             reach, count, others = d[0] + d[1], 4, []
         case _:
             reach, count, others = 1.2 * max(d), 4, []
-    first = beside(along)
+    first = orthogonal_unit(along)
     second = np.cross(along, first)
     angles = 2.0 * np.pi * (np.arange(count) + 0.25) / count
     return [*others, *(reach * (np.cos(x) * first + np.sin(x) * second) for x in angles)]
@@ -58,7 +69,7 @@ def ways_round(surface: Surface, quat: Sequence[float], along: Array) -> list[Ar
 def strings_of(
     origin: Array, insertion: Array, obstacles: Sequence[mw.Obstacle], rng: np.random.Generator, most: int
 ) -> Array:
-    """Return strings (m, N, 3): every choice of ways round where they are few, a random choice of them else."""
+    """Return strings (m, N, 3): all combinations of ways round, or a random choice if there are too many."""
     along = unit(insertion - origin)
     ways = [[None, *ways_round(o.surface, o.quat, along)] for o in obstacles]
     total = float(np.prod([float(len(w)) for w in ways]))
@@ -121,7 +132,7 @@ class _Pushers:
 def _pushed(shape: Shape, d: Array, x: Array) -> Array:
     """Return points inside a surface moved out: along the normal, deep inside an ellipsoid along the radius."""
     if not isinstance(shape, Ellipsoid):
-        # a point on an axis has no way out: any will do
+        # for a point on an axis every direction is equal
         nudged = x + 1e-9 * np.array([0.7, 0.5, 0.3])
         if isinstance(shape, Torus):
             return nudged - shape.height(d, nudged)[..., None] * shape.normal(d, nudged)
@@ -153,7 +164,7 @@ def pulled_tight(strings: Array, pushers: _Pushers) -> Array:
 
 
 def rough_path(string: Array, obstacles: Sequence[mw.Obstacle], pushers: _Pushers) -> list[Touch]:
-    """Return the touches of a string that is pulled tight: one for each surface, two where it bridges a hollow."""
+    """Return the touches of a string that is pulled tight: one for each surface, two if it bridges a hollow."""
     touches = []
     gaps = np.linalg.norm(np.diff(string, axis=0), axis=1)
     for k, nodes in pushers.touching(string):
@@ -172,7 +183,7 @@ def rough_path(string: Array, obstacles: Sequence[mw.Obstacle], pushers: _Pusher
 def repaired(
     origin: Array, insertion: Array, obstacles: Sequence[mw.Obstacle], case: Case
 ) -> list[Touch] | None:
-    """Return the touches of a path with those added whose surfaces it enters, or None where it enters none."""
+    """Return the touches of a path, with new ones for surfaces that it enters, or None if it enters none."""
     stops = [(k, *touch) for k, contacts in enumerate(case.contacts) for touch in contacts]
     ends = [(0, origin, origin, 0.0), *stops, (len(obstacles) - 1, insertion, insertion, 0.0)]
     touches: list[Touch] = []
@@ -203,7 +214,7 @@ def paths_over_row(
     rng: np.random.Generator,
     most: int = STRINGS,
 ) -> list[Case]:
-    """Return tangent paths over a row of surfaces, the shortest strings' first; they are still to be judged."""
+    """Return tangent paths over a row of surfaces, from the shortest strings first; they are not judged yet."""
     strings = strings_of(origin, insertion, obstacles, rng, most)
     pushers = _Pushers(obstacles, strings.shape[1])
     strings = pulled_tight(strings, pushers)
@@ -225,7 +236,7 @@ def paths_over_row(
 def finished(
     origin: Array, insertion: Array, obstacles: Sequence[mw.Obstacle], rough: Sequence[list[Touch]]
 ) -> list[Case]:
-    """Return rough paths polished, with what they enter taken in."""
+    """Return the polished rough paths, with surfaces added that they enter."""
     done: list[Case] = []
     for _ in range(REPAIRS):
         straight = [

@@ -25,16 +25,16 @@ from mjwrap.verification.shapes import (
     Ints,
     Shape,
     Torus,
-    beside,
     dot,
+    orthogonal_unit,
     sizes,
     unit,
 )
 
 RAYS = 64
-TORUS_RAYS = 96  # on each of the two sides of the tube
-WINDING = 1.5 * np.pi  # turn of the longest geodesics that are followed [rad]
-PIECE = 2.0  # turn at most of the pieces by which they are followed [rad]
+TORUS_RAYS = 96  # rays on each of the two sides of the tube
+WINDING = 1.5 * np.pi  # turn of the longest geodesics [rad]
+PIECE = 2.0  # largest turn of a piece of a geodesic [rad]
 SMALLEST_TURN = 1e-7  # of a touch [rad]
 
 
@@ -46,7 +46,7 @@ def free(origin: Array, insertion: Array, obstacle: mw.Obstacle) -> bool:
 
 
 def paths_over_one(origin: Array, insertion: Array, obstacle: mw.Obstacle) -> list[Case]:
-    """Return all paths over one surface that are tangent at both ends, the straight one among them where it is free."""
+    """Return all paths over one surface that are tangent at both ends, including the straight one if it is free."""
     found = [Case(origin, insertion, [obstacle], [[]], float(np.linalg.norm(insertion - origin)))]
     if not free(origin, insertion, obstacle):
         found = []
@@ -73,7 +73,7 @@ def _local(obstacle: mw.Obstacle, point: Array) -> Array:
 
 
 def _over_cylinder(surface: mw.Cylinder | mw.EllipticCylinder, a: Array, b: Array) -> list[tuple]:
-    """Unroll: planar tangents to the section from both ends, the arc between them, and a straight rise."""
+    """Return the paths over a cylinder, unrolled: tangents to the section from both ends, arc, and straight rise."""
     axes = np.full(2, surface.radius) if isinstance(surface, mw.Cylinder) else np.array(surface.radii)
     order = np.argsort(axes)[
         ::-1
@@ -81,7 +81,7 @@ def _over_cylinder(surface: mw.Cylinder | mw.EllipticCylinder, a: Array, b: Arra
     big, small = axes[order]
     m = 1.0 - (small / big) ** 2
     found = []
-    for side in (1.0, -1.0):  # mathematically positive or negative way round
+    for side in (1.0, -1.0):  # counter-clockwise or clockwise
         ends = []
         for point, leaving in ((a, side), (b, -side)):
             scaled = point[:2] / axes
@@ -109,7 +109,7 @@ def _over_cylinder(surface: mw.Cylinder | mw.EllipticCylinder, a: Array, b: Arra
 
 
 def _over_cone(surface: mw.Cone, a: Array, b: Array) -> list[tuple]:
-    """Unroll: the plane of the origin and a generator, the sector, the plane of the insertion, all about the apex."""
+    """Return the paths over a cone, unrolled: the plane of the origin, the sector, and the plane of the insertion."""
     radius, slope, _ = sizes(surface)
     apex = np.array([0.0, 0.0, -radius / slope])
     sine = abs(slope) / np.hypot(1.0, slope)
@@ -158,7 +158,7 @@ def _over_cone(surface: mw.Cone, a: Array, b: Array) -> list[tuple]:
 
 
 def _over_sphere(radius: float, a: Array, b: Array) -> list[tuple]:
-    """Return the shorter way round, in the plane of the centre: a string slips off the other one."""
+    """Return the shorter way round, in the plane of the centre; from the longer one a string slips off."""
     normal = np.cross(a, b)
     if np.linalg.norm(normal) < 1e-12 * np.linalg.norm(a) * np.linalg.norm(b):
         return []
@@ -178,7 +178,7 @@ def _over_sphere(radius: float, a: Array, b: Array) -> list[tuple]:
 
 
 def _horizon(surface: Surface, a: Array) -> list[Array]:
-    """Return the points of a surface at which rays from a graze it, as curves (m, 3) with neighbours side by side."""
+    """Return the points at which rays from a touch a surface tangentially, as curves (m, 3) of neighbouring points."""
     shape, d = SHAPES[type(surface)], sizes(surface)
     angle = np.linspace(0.0, 2.0 * np.pi, RAYS + 1)
     ring = np.stack([np.cos(angle), np.sin(angle)], 1)
@@ -220,10 +220,10 @@ def _horizon(surface: Surface, a: Array) -> list[Array]:
 
 
 def _polar_circle(a: Array, radius: float, ring: Array) -> Array:
-    """Return the circle on which rays from a graze the sphere about the origin."""
+    """Return the circle on which rays from a touch the sphere about the origin tangentially."""
     far = np.linalg.norm(a)
     up = a / far
-    side = beside(up)
+    side = orthogonal_unit(up)
     plane = ring @ np.stack([side, np.cross(up, side)])
     return radius**2 / far * up + radius * np.sqrt(1.0 - (radius / far) ** 2) * plane
 
@@ -250,9 +250,9 @@ def _shot(surface: Surface, a: Array, b: Array) -> list[tuple]:
 
 
 def _followed(shape: Shape, d: Array, P: Array, t: Array) -> tuple[Array, Array, Array]:
-    """Return points and tangents (m, k, 3) of geodesics at arc lengths x (m, k), NaN where a string is gone from them.
+    """Return points and tangents (m, k, 3) of geodesics at arc lengths x (m, k), NaN where a string cannot follow.
 
-    That is where the surface bends away from it, behind a conjugate point, or after one and a half half turns.
+    That is where the surface is concave along it, after a conjugate point, or after one and a half half turns.
     """
     count, piece = len(P), PIECE / float(shape.bend(d))
     alive = np.arange(count)
@@ -285,7 +285,7 @@ def _followed(shape: Shape, d: Array, P: Array, t: Array) -> tuple[Array, Array,
 def _roots(
     rows: Ints, x: Array, rise: Array, sideways: Array, crossing: NDArray[np.bool_], curve: Array, t: Array
 ) -> list[tuple]:
-    """Return touches between neighbouring rays at whose crossings the insertion lies on different sides."""
+    """Return touches between neighbouring rays that pass the insertion on different sides."""
     hits: dict[int, list[tuple[float, float]]] = {}
     for i, j in zip(*np.nonzero(crossing), strict=True):
         share = -rise[i, j] / (rise[i, j + 1] - rise[i, j])

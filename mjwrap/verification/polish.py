@@ -1,8 +1,7 @@
-"""Newton's method on the tangency conditions of rough paths, for the search that judges the solver; none of its code.
+"""Newton's method on the tangency conditions of rough paths, for the independent search, without the solver's code.
 
-A rough path is a list of touches (obstacle, P, t, s). Derivatives are differences of `arcs`' geodesics, so that
-nothing here rests on the analytic Jacobian that the solver uses. All touches of all rough paths of a scene move
-together.
+A rough path is a list of touches (obstacle, P, t, s). Derivatives are differences of the geodesics of `arcs`, so that
+the solver's analytic Jacobian is not used. All touches of all rough paths of a scene are moved together.
 """
 
 from __future__ import annotations
@@ -18,11 +17,11 @@ from mjwrap.verification.arcs import arcs_of
 from mjwrap.verification.certificate import Case, Contacts, rotation
 from mjwrap.verification.shapes import SHAPES, Array, sizes, unit
 
-STEP = 1e-6  # of the differences, in radii and in radians
+STEP = 1e-6  # step of the differences, in radii and in radians
 TANGENT = 1e-11  # largest component of the tangency error of a finished path
 ITERATIONS = 40
-LARGEST = 0.3  # turn or share of a radius by which a touch moves in one step
-VANISHED = 1e-7  # an arc that shrinks below this share of the radius is a touch that is none
+LARGEST = 0.3  # largest turn, or motion relative to a radius, of a touch in one step
+VANISHED = 1e-7  # a touch whose arc is shorter than this share of the radius is removed
 
 
 class Touch(NamedTuple):
@@ -39,7 +38,7 @@ def _size(surface: Surface) -> float:
 
 
 class _Touches:
-    """All touches of all paths, by kind of surface, and what surrounds each of them."""
+    """All touches of all paths by kind of surface, and the neighbours of each touch."""
 
     def __init__(self, obstacles: Sequence[mw.Obstacle], paths: Sequence[Sequence[Touch]]) -> None:
         flat = [touch for path in paths for touch in path]
@@ -78,7 +77,7 @@ class _Touches:
         return P + self.pos[own], t
 
     def frames(self, by: Array) -> tuple[Array, ...]:
-        """Return P, n, b there, then Q, t, n, b at the far end, (m, v, 3), world frame."""
+        """Return P, n, b at the start and Q, t, n, b at the end, (m, v, 3), world frame."""
         P, t, s = self.moved(by)
         out = [np.empty_like(P) for _ in range(7)]
         variants = by.shape[1]
@@ -97,7 +96,7 @@ class _Touches:
 
 
 def _rows(a: Array, b: Array, n: Array, side: Array) -> Array:
-    """Return the two components of the direction from a to b that a tangent does not have."""
+    """Return the two components of the direction from a to b that are zero for a tangent."""
     e = unit(b - a)
     return np.stack([np.einsum("...i,...i->...", e, n), np.einsum("...i,...i->...", e, side)], -1)
 
@@ -105,9 +104,9 @@ def _rows(a: Array, b: Array, n: Array, side: Array) -> Array:
 def polish(
     origin: Array, insertion: Array, obstacles: Sequence[mw.Obstacle], paths: Sequence[Sequence[Touch]]
 ) -> list[Case | None]:
-    """Return each rough path made tangent, or None where Newton's method does not get there.
+    """Return each rough path made tangent, or None if Newton's method does not converge.
 
-    A touch whose arc vanishes on the way is left out, and the rest is tried again.
+    A touch whose arc vanishes is removed, and the method is started again without it.
     """
     paths = [list(path) for path in paths]
     result: list[Case | None] = [None] * len(paths)

@@ -1,9 +1,8 @@
 """Seeded random scenes at muscle scale for robustness.py and motion.py, each with a hint of every kind.
 
-Half of them are constructed backwards: a geodesic on which a string can lie is drawn first, on every surface,
-and the ends are put on its tangents. So one taut path is known in advance, its middle is a good hint, and its
-length bounds the shortest. The other half are placed at random (`scenes.py`)
-and have no good hint.
+Half of them are constructed backwards: on every surface a geodesic on which a string can lie is drawn first, and the
+ends are put on its tangents. So one taut path is known, its middle is a good hint, and its length is an upper bound of
+the shortest length. The other half are placed at random (`scenes.py`) and have no good hint.
 """
 
 from __future__ import annotations
@@ -35,20 +34,20 @@ CLASSES = {
     "64 in a row": "+" * 64,
     "64 of all kinds": "?" * 64,
 }
-WILD = {"?": "cselktp", "+": "cse"}  # letters that are drawn anew for each obstacle of each scene
-POOL = 150  # geodesics of each kind that are drawn at once
-TRIES = 40  # places tried for one surface of a chain
-BACKTRACKS = 3  # links tried per surface of a chain
-LEAST_ARC, MOST_TURN = 2e-3, 2.6  # of a drawn geodesic [m, rad]
-ROW_TURN = 1.2  # the same within a row, so that the row goes on
-STEADY = 0.1  # smallest stiffness left behind a geodesic of a chain, relative to a straight string's
+WILD = {"?": "cselktp", "+": "cse"}  # letters from which each obstacle of each scene is drawn
+POOL = 150  # number of geodesics of each kind that are drawn together
+TRIES = 40  # number of positions tried for one surface of a chain
+BACKTRACKS = 3  # number of links tried per surface of a chain
+LEAST_ARC, MOST_TURN = 2e-3, 2.6  # limits of a drawn geodesic [m, rad]
+ROW_TURN = 1.2  # the same within a row, so that the row can continue
+STEADY = 0.1  # smallest stiffness after a geodesic of a chain, relative to that of a straight string
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One scene: obstacles without hints, and what is known of it.
+    """One scene: obstacles without hints, and hints and a path that are known.
 
-    good, random: a hint for each obstacle, in its frame [m] (good ones None where no path is known); known: the path
+    good, random: a hint for each obstacle, in its frame [m] (good ones None if no path is known); known: the path
     that the scene was made for, or None.
     """
 
@@ -60,7 +59,7 @@ class Scene:
     known: Case | None
 
     def hinted(self, kind: str) -> list[mw.Obstacle] | None:
-        """Return the obstacles with good or random hints or none; None where the kind does not exist."""
+        """Return the obstacles with good hints, random hints or none; None if the scene has no such hints."""
         if kind == "none":
             return self.obstacles
         hints = self.good if kind == "good" else self.random
@@ -87,7 +86,7 @@ class Drawn:
 
 @dataclass
 class Link:
-    """One surface of a chain, in the world: where the string touches it, where it heads, how steadily it is held."""
+    """One surface of a chain, in the world: the string's contact, its direction after it, and its stability."""
 
     drawn: Drawn
     obstacle: mw.Obstacle
@@ -161,7 +160,7 @@ def _quaternion(R: Array) -> tuple[float, ...]:
 
 
 class Maker:
-    """Scenes of one class from one seed: a pool of geodesics, put together anew for each scene."""
+    """Scenes of one class from one seed: geodesics from a pool are combined to scenes."""
 
     def __init__(self, name: str, seed: int, chunk: int) -> None:
         self.kinds = CLASSES[name]
@@ -187,7 +186,7 @@ class Maker:
         return [point_towards(o.surface, unit(self.rng.normal(size=3))) for o in obstacles]
 
     def _placed(self) -> Scene:
-        """Return a scene whose obstacles lie as they happen to; single ones are turned any way."""
+        """Return a scene with randomly placed obstacles; a single obstacle has a random orientation."""
         letters = self.letters()
         while True:
             origin, insertion, row = random_scene(self.rng, letters, hints=False)
@@ -202,7 +201,7 @@ class Maker:
         return Scene(origin, insertion, row, None, self._random_hints(row), None)
 
     def _chained(self, letters: str) -> Scene | None:
-        """Return a scene made along a string: from end to end, each surface put where the string shall touch it."""
+        """Return a scene made along a string: from end to end, each surface is put where the string should touch it."""
         rng, count = self.rng, len(letters)
         spacing = rng.uniform(0.06, 0.12)
         origin = np.array([0.0, *rng.uniform(-0.03, 0.03, 2)])
@@ -241,7 +240,7 @@ class Maker:
     def _next(
         self, letter: str, links: list[Link], origin: Array, heading: Array, spacing: float, count: int
     ) -> Link | None:
-        """Return one more link of a chain, or None where none is found that is clear and steady."""
+        """Return one more link of a chain, or None if none is found that is free of others and stable."""
         rng = self.rng
         point, c, b_before = origin, np.inf, np.zeros(3)
         if links:
@@ -256,7 +255,7 @@ class Maker:
             if placed is None:
                 continue
             obstacle, P, Q, t_Q, b_P, b_Q = placed
-            # Riccati: the stiffness with which what lies behind holds the string against a sideways shift
+            # Riccati: the stiffness with which the previous links hold the string against a sideways shift
             over = 1.0 / room
             if over + c <= STEADY * over:
                 continue
@@ -274,7 +273,7 @@ class Maker:
         return None
 
     def _put(self, drawn: Drawn, P: Array, heading: Array, along_row: bool) -> tuple | None:
-        """Return a surface put so that the string meets it at P; in a row the string has to go on along it."""
+        """Return a surface put so that the string meets it at P; in a row the string must continue along the row."""
         rng, long = self.rng, drawn.surface.__class__ in (mw.Cylinder, mw.Cone, mw.EllipticCylinder)
         for _ in range(8 if along_row else 1):
             n = unit(np.cross(heading, rng.normal(size=3)))
@@ -282,13 +281,13 @@ class Maker:
             pos = P - R @ drawn.P
             t_Q = R @ drawn.t_Q
             Q = R @ drawn.Q + pos
-            wanted = -Q[1:] / 0.15  # back towards the line of the row, the further away the more
+            wanted = -Q[1:] / 0.15  # back towards the line of the row, in proportion to the distance
             if along_row and (
                 t_Q[0] < 0.5 or np.linalg.norm(t_Q[1:] - wanted) > 0.6 or (long and abs(R[0, 2]) > 0.4)
             ):
                 continue
             quat = _quaternion(R)
-            R = rotation(quat)  # to rounding
+            R = rotation(quat)  # equal except for rounding
             P, Q = R @ drawn.P + pos, R @ drawn.Q + pos
             b_P, b_Q = np.cross(R @ drawn.t, R @ drawn.n), np.cross(R @ drawn.t_Q, R @ drawn.n_Q)
             return mw.Obstacle(drawn.surface, tuple(pos), quat), P, Q, R @ drawn.t_Q, b_P, b_Q

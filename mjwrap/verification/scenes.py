@@ -13,8 +13,8 @@ from mjwrap.verification.shapes import SHAPES, Array, sizes
 
 SURFACES = {"cylinder": mw.Cylinder, "sphere": mw.Sphere, "ellipsoid": mw.Ellipsoid, "torus": mw.Torus}
 LETTERS = "cselktp"  # cylinder, sphere, ellipsoid, elliptic cylinder, cone, torus, capsule
-REACH = 0.25  # how far from its centre along its axis a surface of a row matters [m]
-MARGIN = 2e-3  # between surfaces of a row: more than what `gap` may be off [m]
+REACH = 0.25  # length of a surface of a row, from its centre along its axis, that is considered [m]
+MARGIN = 2e-3  # distance between surfaces of a row: more than the error of `gap` [m]
 
 
 def radius_of(obstacle: mw.Obstacle) -> float:
@@ -112,7 +112,7 @@ def _filled(axes: Array, directions: Array) -> tuple[Array, Array]:
 def gap(a: mw.Obstacle, b: mw.Obstacle) -> float:
     """Return the distance between two surfaces within REACH of their centres, to about a millimetre [m]."""
     if isinstance(b.surface, mw.Ellipsoid | mw.EllipticCylinder):
-        a, b = b, a  # the heights of the others cost less
+        a, b = b, a  # heights of the other shapes are cheaper
     centres, radii = balls(a)
     return float((height(b, centres) - radii).min())
 
@@ -147,7 +147,7 @@ def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) 
             return mw.Cone(bottom, rng.uniform(0.2, 0.8) * bottom, rng.uniform(0.08, 0.2))
         case "p":
             return mw.Capsule(size(0.01, 0.04), size(0.01, 0.05))
-    raise ValueError(f"{letter!r} is none of {LETTERS}")
+    raise ValueError(f"surface letter must be one of {LETTERS}, not {letter!r}")
 
 
 def point_towards(surface: Surface, direction: Array) -> Array:
@@ -191,6 +191,6 @@ def random_scene(rng: np.random.Generator, kinds: str, hints: bool) -> tuple[Arr
 def check_path(
     origin: Array, insertion: Array, obstacles: Sequence[mw.Obstacle | mw.ViaPoint], sol: mw.PathSolution
 ) -> None:
-    """Assert from the answer alone that it is a tangent, clear, geodesic path, shortest among its neighbours."""
+    """Assert from the solution alone that it is a tangent, geodesic path above all surfaces and a local minimum."""
     reason = findings([Case.of(origin, insertion, obstacles, sol)])[0]
     assert not reason, reason

@@ -1,4 +1,4 @@
-"""Geometry of every surface, written without any of the package's kernels: slow, obvious NumPy.
+"""Geometry of every surface without the package's kernels, in simple NumPy.
 
 A shape works in the surface's own frame. Its sizes d (..., k) [m] and points x (..., 3) [m] broadcast against
 each other, so that one call serves a thousand surfaces. The shape operator W is that of dn = W dp with the
@@ -16,7 +16,7 @@ import mjwrap as mw
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
-FARTHEST = 60  # Newton steps to the nearest point of an ellipse; each at least halves what is missing
+FARTHEST = 60  # Newton steps to the nearest point of an ellipse; each at least halves the error
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -29,8 +29,8 @@ def unit(a: Array) -> Array:
     return a / np.sqrt(dot(a, a))[..., None]
 
 
-def beside(a: Array) -> Array:
-    """Return some unit vectors at right angles to a (..., 3)."""
+def orthogonal_unit(a: Array) -> Array:
+    """Return unit vectors perpendicular to a (..., 3), in an arbitrary direction."""
     least = np.eye(3)[np.abs(a).argmin(-1)]
     cross: Array = np.cross(a, least)
     return unit(cross)
@@ -52,7 +52,7 @@ class Shape:
         raise NotImplementedError
 
     def level(self, d: Array, x: Array) -> Array:
-        """Return a quick stand-in for the height: same sign, never larger, convex along lines if the shape is."""
+        """Return a cheap substitute for the height: same sign, never larger, convex along lines if the shape is."""
         return self.height(d, x)
 
     def gradient(self, d: Array, x: Array) -> Array:
@@ -68,7 +68,7 @@ class Shape:
         return np.einsum("...i,...ij,...j->...", v, self.hessian(d, x), v)
 
     def bend(self, d: Array) -> Array:
-        """Return a bound on the curvature of geodesics, as a rule of thumb for steps [1/m]."""
+        """Return an approximate bound on the curvature of geodesics, for step lengths [1/m]."""
         return 1.0 / d[..., 0]
 
     def normal(self, d: Array, x: Array) -> Array:
@@ -92,7 +92,7 @@ class Shape:
         return self.second(d, x, t) / np.sqrt(dot(g, g))
 
     def gauss(self, d: Array, x: Array) -> Array:
-        """Return the Gaussian curvature [1/m^2]: the product of W's two eigenvalues that are not the normal's."""
+        """Return the Gaussian curvature [1/m^2]: the product of the two eigenvalues of W in the tangent plane."""
         w = self.shape_operator(d, x)
         trace = np.einsum("...ii->...", w)
         return 0.5 * (trace**2 - np.einsum("...ij,...ji->...", w, w))
@@ -122,7 +122,7 @@ class Ellipsoid(Shape):
         return 1.0 / d[..., :3] ** 2
 
     def level(self, d: Array, x: Array) -> Array:
-        """Scale the surface until it meets x: each point of it moves by the smallest semi-axis at least."""
+        """Scale the surface until it meets x: each of its points moves by at least the smallest semi-axis."""
         inverse = self.inverse(d)
         return (np.sqrt((x * x * inverse).sum(-1)) - 1.0) / np.sqrt(inverse.max(-1))
 
@@ -150,7 +150,7 @@ class Ellipsoid(Shape):
         return inverse[..., 2] / np.sqrt(finite)
 
     def nearest(self, d: Array, x: Array) -> Array:
-        """Return x / (1 + m / a^2) with the multiplier m that lies on the surface; Newton climbs to it from below."""
+        """Return x / (1 + m / a^2) with the multiplier m that puts it on the surface; Newton's method, from below."""
         inverse = np.broadcast_to(self.inverse(d), x.shape)
         with np.errstate(divide="ignore", invalid="ignore"):
             lowest = np.where(inverse > 0.0, (np.sqrt(inverse) * np.abs(x) - 1.0) / inverse, -np.inf)
@@ -219,7 +219,7 @@ class Torus(Shape):
 
 
 class Cone(Shape):
-    """d: radius at z = 0, slope dr/dz, half length; one nappe, from the apex on."""
+    """d: radius at z = 0, slope dr/dz, half length; only one side of the apex."""
 
     flat = True
 
@@ -228,7 +228,7 @@ class Cone(Shape):
         return -d[..., 0] / d[..., 1]
 
     def height(self, d: Array, x: Array) -> Array:
-        """Return the distance; from beyond the apex that is the distance from the apex itself."""
+        """Return the distance; beyond the apex that is the distance from the apex."""
         rho, rise = np.hypot(x[..., 0], x[..., 1]), x[..., 2] - self.apex(d)
         along = rho * np.abs(d[..., 1]) + rise * np.sign(d[..., 1])
         return np.where(
@@ -289,7 +289,7 @@ class Capsule(Shape):
         return unit(self._offset(d, x))
 
     def hessian(self, d: Array, x: Array) -> Array:
-        """Return the sphere's, less what the cylinder does not have along its axis."""
+        """Return the sphere's Hessian, without the part along the axis on the cylinder."""
         offset = self._offset(d, x)
         size = np.sqrt(dot(offset, offset))[..., None, None]
         straight = np.abs(x[..., 2]) <= d[..., 1]
@@ -326,11 +326,11 @@ def sizes(surface: Any) -> Array:
             return np.array([0.5 * (bottom + top), 0.5 * (top - bottom) / half, half])
         case mw.Capsule():
             return np.array([surface.radius, surface.half_length])
-    raise TypeError(f"no shape is known for {surface!r}")
+    raise TypeError(f"there is no shape for {surface!r}")
 
 
 def half_length(surface: Any) -> float:
-    """Return how far along z a surface may be touched [m]."""
+    """Return the largest |z| at which a surface may be touched [m]."""
     if isinstance(surface, mw.Cylinder | mw.EllipticCylinder | mw.Cone):
         return float(surface.half_length)
     return np.inf

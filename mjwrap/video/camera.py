@@ -1,4 +1,4 @@
-"""Cameras of films: one of the model, MuJoCo's free camera, or one that looks at the muscles."""
+"""Cameras of films: a camera of the model, MuJoCo's free camera, or one that looks at the muscles."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ import numpy as np
 
 from mjwrap.errors import RecordingError
 
-MUSCLES = "muscles"  # the name of the camera that looks at them, unless the model has one of that name
-ROOM = 1.5  # distance, in sizes of all muscles, at which a camera of 45 degrees has them in its picture
+MUSCLES = (
+    "muscles"  # name of the camera that looks at the muscles, unless the model has a camera of this name
+)
+ROOM = 1.5  # distance, relative to the size of all muscles, at which a camera of 45 degrees shows them all
 ELEVATION = -12.0  # [degrees]
 
 
 def find_camera(
     model: mujoco.MjModel, camera: str | int | mujoco.MjvCamera | None
 ) -> mujoco.MjvCamera | None:
-    """Return the camera meant, None for the one on the muscles; RecordingError lists all where there is no such."""
+    """Return a camera, None for the one that looks at the muscles; RecordingError, which lists all, if unknown."""
     if isinstance(camera, mujoco.MjvCamera):
         return camera
     found = mujoco.MjvCamera()
@@ -33,9 +35,9 @@ def find_camera(
 
 
 def look_at_muscles(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCamera:
-    """Return a free camera on all sites of tendons and tuples at the pose of `data`, or on the whole model.
+    """Return a free camera that looks at all sites of tendons and tuples, or, if there are none, at the whole model.
 
-    It looks along the level direction in which they are thinnest, from the side on which fewer bodies are.
+    It looks along the horizontal direction of their smallest extent, from the side with fewer bodies.
     """
     found = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, found)

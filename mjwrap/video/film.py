@@ -1,4 +1,4 @@
-"""`Video`: films a simulation at simulation time."""
+"""`Video`: films a simulation, at a constant ratio of film time to simulated time."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from mjwrap.video.camera import find_camera, look_at_muscles
 from mjwrap.video.formats import FORMATS, Writer
 from mjwrap.video.offscreen import Offscreen
 
-EARLY = 1e-6  # part of a frame's period by which it may come too early, for times that are not exact
+EARLY = 1e-6  # share of a frame's period by which it may be early, because times are rounded
 
 
 class Video(RunLog):
     """Film a simulation as MuJoCo's renderer shows it, into an .mp4 or .gif file.
 
-    Muscles of a model that `install` or `load` returned are shown. The file gets its name only when it is complete: at
-    `close`, or at the end of a `with` block, also if Ctrl-C ended it. After an error inside the block no file is
-    left, and an existing file of that name stays as it was.
+    It shows the muscles of a model that `install` or `load` returned. The file gets its name only when it is complete:
+    at `close`, or at the end of a `with` block, also after Ctrl-C. After an error inside the block no file is left, and
+    an existing file of that name is unchanged.
 
     Args:
         model: a mujoco.MjModel.
@@ -32,9 +32,9 @@ class Video(RunLog):
         speed: simulated seconds per second of the film.
         width: of a frame [pixels].
         height: of a frame [pixels].
-        camera: name or id of a camera of the model, "muscles" for one that looks at all muscles where the film
+        camera: name or id of a camera of the model, "muscles" for a camera that looks at all muscles when the film
             begins, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model.
-        option: a mujoco.MjvOption: what is shown.
+        option: a mujoco.MjvOption, which selects what is shown.
 
     Raises:
         RecordingError: before the run, if no OpenGL works, the file cannot be written, or the package that writes it
@@ -64,7 +64,7 @@ class Video(RunLog):
         self._signature = model.signature
         self._rate = fps / speed  # frames per simulated second
         self._start: float | None = None  # time of the first frame
-        self._number, self._last_time = -1, -math.inf  # of the last frame, of the last call
+        self._number, self._last_time = -1, -math.inf  # times of the last frame and of the last call
         target = PartFile(path, *FORMATS)
         size = int(width), int(height)
         with contextlib.ExitStack() as undo:
@@ -79,11 +79,10 @@ class Video(RunLog):
         self._begin(str(target.path), target, release.close)
 
     def log(self, data: mujoco.MjData) -> None:
-        """Add the state of `data` to the film where a frame is due.
+        """Add the state of `data` to the film if a frame is due.
 
-        The frame shows the poses and paths that were computed last, so after `mj_step` those at which the step
-        began. Raises RecordingError where the disk is full, where time runs backwards (one film is one run), and
-        after `close`.
+        The frame shows the last computed poses and paths, which after `mj_step` are those at the start of the step.
+        Raises RecordingError if the disk is full, if time goes backwards (a film has one run), and after `close`.
         """
         if self._ended:
             raise RecordingError(f"cannot log to '{self._place}': {self._ended}")

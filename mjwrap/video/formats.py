@@ -1,4 +1,4 @@
-"""Writing frames into a file: MP4 with PyAV, GIF with Pillow; each is loaded only when needed."""
+"""Write frames to a file: MP4 with PyAV, GIF with Pillow; each is loaded only when needed."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from mjwrap.errors import RecordingError
 
 Picture = NDArray[np.uint8]
-GIF_RATE = 50.0  # frames per second above which viewers slow a GIF down
-_QUALITY = "18"  # x264's constant rate factor: hardly any loss to see
+GIF_RATE = 50.0  # largest frame rate at which viewers play a GIF at full speed
+_QUALITY = "18"  # x264's constant rate factor: almost no visible loss
 
 
 class Writer(Protocol):
-    """Takes pictures with their numbers, in rising order; a number left out shows the picture before it for longer."""
+    """A writer of numbered pictures, in increasing order; a missing number repeats the picture before it."""
 
     def add(self, picture: Picture, number: int) -> None:
         """Append a picture (height, width, 3)."""
@@ -29,12 +29,12 @@ class Writer(Protocol):
         ...
 
     def abandon(self) -> None:
-        """Let go of the file as it is."""
+        """Close the file as it is."""
         ...
 
 
 class Mp4:
-    """H.264 in MP4, as browsers and slides play it; written while it is filmed."""
+    """H.264 in MP4, which browsers and slides can play; written during the run."""
 
     def __init__(self, part: Path, rate: float, width: int, height: int) -> None:
         if width % 2 or height % 2:
@@ -60,17 +60,17 @@ class Mp4:
         self._file.mux(self._stream.encode(frame))
 
     def finish(self, end: int) -> None:
-        """Encode what waits and close."""
+        """Encode the remaining pictures and close."""
         self._file.mux(self._stream.encode(None))
         self._file.close()
 
     def abandon(self) -> None:
-        """Close without the rest."""
+        """Close without encoding the remaining pictures."""
         self._file.close()
 
 
 class Gif:
-    """A GIF that repeats, of 256 colours a picture; kept in memory until it is finished."""
+    """A GIF that repeats, with 256 colours per picture; kept in memory until it is finished."""
 
     def __init__(self, part: Path, rate: float, width: int, height: int) -> None:
         if rate > GIF_RATE:
@@ -94,7 +94,7 @@ class Gif:
         self._numbers.append(number)
 
     def finish(self, end: int) -> None:
-        """Write all pictures; a GIF counts in hundredths of a second, so its rounded times add up to the right one."""
+        """Write all pictures; their times are rounded to hundredths of a second such that the sum is right."""
         ticks = np.rint(100.0 * np.array([*self._numbers, end]) / self._rate).astype(int)
         self._pictures[0].save(
             self._part, format="GIF", save_all=True, append_images=self._pictures[1:], loop=0,
@@ -103,7 +103,7 @@ class Gif:
         self.abandon()
 
     def abandon(self) -> None:
-        """Forget the pictures."""
+        """Discard the pictures."""
         self._pictures.clear()
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a model without a window, with MuJoCo's renderer on any OpenGL that works."""
+"""Draw a model without a window, with MuJoCo's renderer and any OpenGL backend that works."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import RecordingError
 
-MAXGEOM = 20_000  # room of the scene, as in MuJoCo's viewer
+MAXGEOM = 20_000  # largest number of geoms in the scene, as in MuJoCo's viewer
 _CHOICE = "MUJOCO_GL"
 
 
 def _backends() -> Iterator[tuple[str, str]]:
-    """Yield name and module of the backends to try: the one that MUJOCO_GL names, else what may work here."""
+    """Yield name and module of the backends to try: the one that MUJOCO_GL names, else those that may work here."""
     chosen = os.environ.get(_CHOICE, "").strip()
     headless = sys.platform == "linux" and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
@@ -34,9 +34,9 @@ def _backends() -> Iterator[tuple[str, str]]:
 
 
 class Offscreen:
-    """A canvas of the given size [pixels] for one model; `picture` needs the thread that made it.
+    """A canvas of a given size [pixels] for one model; `picture` must be called in the thread that made the canvas.
 
-    Raises RecordingError where no OpenGL works, with what each backend said.
+    Raises RecordingError, with the error of each backend, if no OpenGL works.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
@@ -48,7 +48,7 @@ class Offscreen:
                     warnings.simplefilter("ignore")
                     self._open(importlib.import_module(module), width, height)
                 break
-            except Exception as error:  # each backend fails in its own way
+            except Exception as error:  # every backend raises errors of its own
                 faults.append(f"{name}: {str(error).strip() or type(error).__name__}")
         else:
             raise RecordingError(
@@ -87,7 +87,7 @@ class Offscreen:
         return np.ascontiguousarray(pixels[::-1])
 
     def close(self) -> None:
-        """Give OpenGL back what the canvas took; a second call does nothing."""
+        """Free the canvas's OpenGL resources; a second call does nothing."""
         if self._context is not None:
             self._context.make_current()
             self._renderer.free()

@@ -11,19 +11,25 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.common.recorded import LOCAL, RecordingSettings
 from mjwrap.errors import TableError
 
-HOW = ("rate", "groups", "force_scale")  # only say how it is recorded
+MODEL_HELP = "MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package"
+INITIAL_POSE = "qpos0, the model's initial pose"
+RECORDING_DETAILS = (
+    "rate",
+    "groups",
+    "force_scale",
+)  # options that change a recording but do not ask for one
 
 
 def add_model(parser: argparse.ArgumentParser, keyframe: str, seed: str) -> None:
-    """Add MODEL, --keyframe and --seed; keyframe: what the pose of the keyframe is for, seed: of what."""
+    """Add MODEL, --keyframe and --seed; keyframe, seed: the help texts of these two options."""
     add = parser.add_argument
-    add("model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
-    add("--keyframe", metavar="NAME", help=f"{keyframe} (default: the model's own)")
+    add("model", metavar="MODEL", help=MODEL_HELP)
+    add("--keyframe", metavar="NAME", help=f"{keyframe} (default: {INITIAL_POSE})")
     add("--seed", type=at_least(0), default=0, metavar="N", help=f"{seed} (default %(default)s)")
 
 
 def positive(text: str) -> float:
-    """Return a finite number above zero, for argparse."""
+    """Convert an argument to a finite number above zero."""
     value = _number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text} must be a finite number above zero")
@@ -31,7 +37,7 @@ def positive(text: str) -> float:
 
 
 def not_negative(text: str) -> float:
-    """Return a finite number, zero or more, for argparse."""
+    """Convert an argument to a finite number, zero or more."""
     value = _number(text)
     if not (math.isfinite(value) and value >= 0.0):
         raise argparse.ArgumentTypeError(f"{text} must be a finite number, zero or more")
@@ -42,11 +48,11 @@ def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
 
 
 def at_least(least: int) -> Callable[[str], int]:
-    """Return the argparse type of a whole number of at least `least`."""
+    """Return an argparse type: a whole number of at least `least`."""
 
     def whole(text: str) -> int:
         value = int(text)
@@ -59,15 +65,15 @@ def at_least(least: int) -> Callable[[str], int]:
 
 
 def pixels(text: str) -> tuple[int, int]:
-    """Read WIDTHxHEIGHT, from 1 to 16384 pixels each."""
+    """Convert WIDTHxHEIGHT to two whole numbers, from 1 to 16384 pixels each."""
     width, _, height = text.partition("x")
     if not (width.isdigit() and height.isdigit() and all(1 <= int(x) <= 16384 for x in (width, height))):
-        raise argparse.ArgumentTypeError(f"'{text}' is no size in pixels; write it like 640x480")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size in pixels; write it like 640x480")
     return int(width), int(height)
 
 
 def port(text: str) -> int:
-    """Return a port that has a next one, for argparse."""
+    """Convert an argument to a port number that has a successor: the server uses both."""
     number = at_least(1)(text)
     if number >= 65535:
         raise argparse.ArgumentTypeError(f"{text} must lie between 1 and 65534")
@@ -75,7 +81,7 @@ def port(text: str) -> int:
 
 
 def number(text: str, where: str) -> float:
-    """Return a finite number, or say where it is not one."""
+    """Return a finite number; otherwise raise a `UserError` that begins with `where`."""
     try:
         value = float(text)
     except ValueError:
@@ -86,28 +92,28 @@ def number(text: str, where: str) -> float:
 
 
 def add_analysis(add: Callable[..., object]) -> None:
-    """Add the option --analysis by a parser's or group's add_argument."""
+    """Add the option --analysis; add: the add_argument of a parser or group."""
     add(
         "--analysis",
         metavar="PREFIX",
-        help="lengths, fibre lengths, tensions and moment arms as OpenSim's MuscleAnalysis names them: "
+        help="write lengths, fibre lengths, tensions and moment arms to files named as by OpenSim's MuscleAnalysis: "
         "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto",
     )
 
 
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option --json, with a file or without one."""
+    """Add the option --json, whose file name may be left out."""
     parser.add_argument(
         "--json",
         nargs="?",
         const="-",
         metavar="FILE.json",
-        help=f"{what}, as JSON; without a file name (or with -) on standard output, in place of the text",
+        help=f"{what} as JSON; without a file name, or with -, to standard output in place of the text",
     )
 
 
 def read_kinds(text: str) -> list[str]:
-    """Return the kinds of numbers in a list such as "length,moment_arm"; `UserError` lists them all."""
+    """Return the kinds in a list such as "length,moment_arm"; an unknown one is a `UserError` that lists all kinds."""
     from mjwrap.runs.run_table import (
         check_kinds,  # with the muscles, which replaying a recording does not need
     )
@@ -119,30 +125,30 @@ def read_kinds(text: str) -> list[str]:
 
 
 def add_recording(parser: Any, places: Any) -> None:
-    """Add the options of a recording; places: the group of those that exclude each other."""
+    """Add the options of a recording; places: the group of options that exclude each other."""
     add = parser.add_argument
-    add("--record", metavar="FILE.rrd", help="recording for the rerun viewer (mjwrap replay)")
+    add("--record", metavar="FILE.rrd", help="write a recording for the rerun viewer (see mjwrap replay)")
     places.add_argument(
         "--connect",
         nargs="?",
         const=LOCAL,
         metavar="URL",
-        help="stream to a viewer that runs: rerun+http://HOST:PORT/proxy, or without an address the one here",
+        help="stream to a running viewer (rerun+http://HOST:PORT/proxy; default: the viewer on this machine)",
     )
     add = parser.add_argument
     add(
         "--rate",
         type=positive,
         metavar="HZ",
-        help="states per simulated second of its curves (default: every one)",
+        help="number of states per simulated second in the recording's curves (default: all)",
     )
     add("--groups", nargs="+", action="extend", default=[], metavar="NAME=PATTERN,...", help="muscles whose curves "
-        "stand together (* and ? stand for anything; default: those that move the same body)")  # fmt: skip
+        "are shown together (* and ? match any characters; default: muscles that move the same body)")  # fmt: skip
     add(
         "--force-scale",
         type=positive,
         metavar="M/N",
-        help="length of its force arrows (default: fits the model)",
+        help="length of the recording's force arrows per newton (default: chosen to fit the model)",
     )
 
 
@@ -156,19 +162,19 @@ def add_serving(parser: Any, places: Any, what: str) -> None:
         type=port,
         default=9090,
         metavar="N",
-        help="where to serve: N and N + 1 (default %(default)s)",
+        help="port of the server; port N + 1 is used too (default %(default)s)",
     )
 
 
 def recording_settings(options: argparse.Namespace, recorded: bool, places: str) -> RecordingSettings:
     """Return what the options of `add_recording` ask for.
 
-    `UserError` where they say how to record and nothing is recorded, or name a group without patterns. places: the
-    options that would record.
+    recorded: whether a recording is asked for; places: the options that ask for one. Raises `UserError` if an option of
+    a recording is given without a recording, or a group has no patterns.
     """
-    for name in HOW:
+    for name in RECORDING_DETAILS:
         if getattr(options, name) and not recorded:
-            raise UserError(f"--{name.replace('_', '-')} is for a recording: it goes with {places}")
+            raise UserError(f"--{name.replace('_', '-')} needs a recording: add {places}")
     return RecordingSettings(
         path=options.record,
         connect=options.connect or "",

@@ -1,4 +1,4 @@
-"""Running a command: its parser, errors in one line, exit codes, and warnings of libraries."""
+"""Run a command: its parser, one-line errors, exit codes, and warnings of libraries."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
 
 _SUFFIXES = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
 _MYO_NOISE = (
-    "Attaching a spec with an empty prefix"  # myo_sim's models do that; it matters for saving them only
+    "Attaching a spec with an empty prefix"  # raised by myo_sim's models; matters only when they are saved
 )
 
 INPUTS = ("model", "file", "excitation", "prescribe", "states", "lengths", "moment_arms")  # name what is read
 
 
 class _Help(argparse.HelpFormatter):
-    """Fills paragraphs to the width of the terminal; what is indented stays as it is."""
+    """Fill paragraphs to the width of the terminal; indented lines stay as they are."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         found: list[str] = []
@@ -42,7 +42,7 @@ class _Help(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, and whose help is a command's documentation, its examples last."""
+    """A parser with one-line errors, whose help is the module docstring of the command, examples last."""
 
     def __init__(self, name: str, documentation: str) -> None:
         what, mark, examples = documentation.partition("\nExamples:")
@@ -55,7 +55,7 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Read the arguments; a model or recording after --json or --connect is not the place that these go to."""
+        """Read the arguments; a model or recording after --json or --connect is not taken as their value."""
         given = list(args or [])
         optional = {f: a.const for a in self._actions if a.nargs == "?" for f in a.option_strings}
         for i, (word, following) in enumerate(itertools.pairwise(given)):
@@ -66,31 +66,31 @@ class Parser(argparse.ArgumentParser):
         return super().parse_args(given, namespace)
 
     def format_help(self) -> str:
-        """Return the help, in which the first line names what is needed and the list all that is possible."""
+        """Return the help: the usage line names the required arguments only, the list below all of them."""
         needed = [a for a in self._actions if not a.option_strings]
         names = [f"[{a.metavar}]" if a.nargs == "?" else str(a.metavar) for a in needed]
         self.usage = " ".join([self.prog, *names, "[OPTION ...]"])
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Print the message and stop."""
+        """Print the message and exit with code 2."""
         if "arguments are required" in message and "--" not in message:
-            message += "; it comes before the options, some of which take all words that follow"
+            message += "; write it before the options, because some options take all words that follow"
         self.exit(USER_ERROR, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
 def inputs(options: argparse.Namespace) -> Iterator[str]:
-    """Yield what a command's arguments name to be read: files, or what may stand for one."""
+    """Yield the arguments that may name a file to be read."""
     for option in INPUTS:
         given = getattr(options, option, None) or []
         yield from [given] if isinstance(given, str) else given
 
 
 def run(name: str, body: Callable[[], int]) -> int:
-    """Run a command's body and return its exit code; errors become one line on standard error and a code.
+    """Run a command's body and return its exit code; an error becomes one line on standard error and an exit code.
 
-    2: the user can mend it; 1: the run failed; 128 and the signal's number where one asked it to end, so 130 for
-    Ctrl-C. Output files that are not finished are removed.
+    2: a mistake that the user can correct; 1: the run failed; 128 + n: ended by signal n, so 130 for Ctrl-C. Unfinished
+    output files are removed.
     """
     try:
         with stoppable(), _quiet(name):
@@ -102,7 +102,7 @@ def run(name: str, body: Callable[[], int]) -> int:
     except MemoryError:
         return _say(name, "out of memory", RUN_FAILED)
     except KeyboardInterrupt as error:
-        # Where it came up inside an exec or eval (numba has some), `python -m` would end by the signal, whatever
+        # If the signal came inside an exec or eval (numba has some), `python -m` would end by the signal, whatever
         # the exit code; the next exec makes it forget that.
         exec("")
         stop = error if isinstance(error, Stopped) else Stopped()
@@ -118,18 +118,18 @@ def _say(name: str, error: object, code: int) -> int:
 
 @contextlib.contextmanager
 def _quiet(name: str) -> Iterator[None]:
-    """Show each warning once, in a line on standard error, and leave no MUJOCO_LOG.TXT behind."""
+    """Show each warning once, as one line on standard error, and keep MuJoCo from writing MUJOCO_LOG.TXT."""
     try:
-        import mujoco  # here, so that help needs none of it
+        import mujoco  # imported here, because --help does not need it
     except (
         RuntimeError,
         AttributeError,
-    ) as error:  # what MuJoCo raises where MUJOCO_GL fits nothing installed
+    ) as error:  # raised by MuJoCo if MUJOCO_GL names a backend that is not installed
         backend = os.environ.get("MUJOCO_GL")
         if backend is None:
             raise
         raise UserError(
-            f"MuJoCo does not load with MUJOCO_GL={backend}: {error}; unset it, or try egl"
+            f"MuJoCo cannot be loaded with MUJOCO_GL={backend}: {error}; unset MUJOCO_GL, or try egl"
         ) from None
 
     seen: set[str] = set()

@@ -4,8 +4,8 @@ FAULTS, RUN_FAILED, USER_ERROR = 1, 1, 2
 
 
 class UserError(Exception):
-    """Something that the user can mend; the message says what, and what exists instead."""
+    """A mistake that the user can correct; the message says what is wrong and lists what exists instead."""
 
 
 class RunError(Exception):
-    """A run that could not be finished, through nobody's mistake on the command line."""
+    """The run failed although its arguments were correct."""

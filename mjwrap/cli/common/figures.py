@@ -1,4 +1,4 @@
-"""Figures drawn with matplotlib: whether it is installed, and saving them."""
+"""Save figures drawn with matplotlib, and test that it is installed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mjwrap.files.atomic import PartFile
 
 
 def need_matplotlib() -> None:
-    """Raise `UserError` before a run whose plot could not be drawn."""
+    """Raise `UserError` if matplotlib is not installed: called before the run."""
     try:
         import matplotlib
     except ImportError:
@@ -18,7 +18,7 @@ def need_matplotlib() -> None:
 
 
 def save_figure(figure: Any, output: PartFile) -> None:
-    """Write a figure, give the file its name, and close the figure."""
+    """Write a figure to its file and close the figure."""
     import matplotlib.pyplot as plt
 
     with output.writing():

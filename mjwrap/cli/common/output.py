@@ -1,4 +1,4 @@
-"""Output of commands: files that appear whole or not at all, and a report as text or JSON."""
+"""Output of commands: files that are written completely or not at all, and a report as text or JSON."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, uninterrupted
 
 Kept = TypeVar("Kept")
-_files: list[PartFile] = []  # of the command that runs
-_inputs: set[str] = set()  # resolved paths of the files that it reads
+_files: list[PartFile] = []  # output files of the running command
+_inputs: set[str] = set()  # resolved paths of the files that the command reads
 
 
 def note_inputs(entries: Iterable[str]) -> None:
-    """Remember the files among the entries (FILE or JOINT=FILE), which no output may take the place of."""
+    """Remember the files among the entries (FILE or JOINT=FILE): no output may overwrite them."""
     for entry in entries:
         for path in (entry, entry.partition("=")[2]):
             if os.path.isfile(path):
@@ -29,13 +29,13 @@ def note_inputs(entries: Iterable[str]) -> None:
 
 
 def check_unread(path: str, option: str) -> None:
-    """Raise `UserError` where an output would take the place of a file that the command reads."""
+    """Raise `UserError` if an output would overwrite a file that the command reads."""
     if os.path.realpath(path) in _inputs:
         raise UserError(f"{option} '{path}': that file is also read")
 
 
 def open_output(path: str, option: str, *suffixes: str) -> PartFile:
-    """Return a file to be written; what is wrong with its place is the user's to mend, before the run."""
+    """Open an output file; raises `UserError` if it cannot be written, which is before the run."""
     check_unread(path, option)
     with uninterrupted():
         file = opened(lambda: PartFile(path, *suffixes, option=option))
@@ -46,12 +46,12 @@ def open_output(path: str, option: str, *suffixes: str) -> PartFile:
 
 
 def open_analysis(path: str) -> PartFile:
-    """Return one of the tables of --analysis, as `open_output` does."""
+    """Open one of the tables of --analysis, as `open_output` does."""
     return open_output(path, "--analysis", ".sto")
 
 
 def opened(make: Callable[[], Kept]) -> Kept:
-    """Return a file, recording or film that has been begun; what is wrong with its place is the user's to mend."""
+    """Return the file, recording or film that `make` opens; raises `UserError` if it cannot be written."""
     try:
         return make()
     except RecordingError as error:
@@ -59,7 +59,7 @@ def opened(make: Callable[[], Kept]) -> Kept:
 
 
 def discard_outputs() -> None:
-    """Remove what has not become a file, at the end of a command."""
+    """Remove unfinished output files at the end of a command."""
     for file in _files:
         file.discard()
     _files.clear()
@@ -67,19 +67,19 @@ def discard_outputs() -> None:
 
 
 class Report:
-    """What a command says: text on standard output, and, where --json asks for it, the same as values."""
+    """The report of a command: text on standard output and, with --json, the same as values."""
 
     def __init__(self, path: str | None) -> None:
         self._instead = path == "-"
         self._file = open_output(path, "--json", ".json") if path and not self._instead else None
 
     def say(self, text: str = "") -> None:
-        """Print a line of text, unless JSON takes its place."""
+        """Print a line of text, unless JSON goes to standard output."""
         if not self._instead:
             say(text)
 
     def finish(self, facts: Mapping[str, Any]) -> None:
-        """Write the values, if they were asked for."""
+        """Write the values as JSON, if --json was given."""
         values = plain(facts)
         if self._instead:
             unicode = (sys.stdout.encoding or "").lower().startswith("utf")
@@ -90,7 +90,7 @@ class Report:
 
 
 def say(text: str) -> None:
-    """Print at once; where nobody reads it, files that were asked for are still written."""
+    """Print at once; if standard output is closed, go on, so that the output files are still written."""
     try:
         with written():
             print(text, flush=True)
@@ -101,7 +101,7 @@ def say(text: str) -> None:
 
 @contextlib.contextmanager
 def written() -> Iterator[None]:
-    """After an error of standard output let the rest go nowhere; all but a closed pipe is a `RunError`."""
+    """After an error of standard output discard the rest; raises `RunError` unless a pipe was closed."""
     try:
         yield
     except OSError as error:
@@ -112,7 +112,7 @@ def written() -> Iterator[None]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON knows it: arrays as lists, what is not finite as null."""
+    """Convert a value for JSON: arrays to lists, numbers that are not finite to null."""
     if hasattr(value, "tolist"):  # NumPy's arrays and numbers
         value = value.tolist()
     if isinstance(value, float):

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def progress_bar(total: float, unit: str, label: str) -> Any:
-    """Return a bar with `update(n)` and `close()` that shows after two seconds, on a terminal only."""
+    """Return a bar with `update(n)` and `close()`; it appears after two seconds, only on a terminal."""
     if sys.stderr.isatty():
         with contextlib.suppress(ImportError):
             from tqdm import tqdm
@@ -19,7 +19,7 @@ def progress_bar(total: float, unit: str, label: str) -> Any:
 
 
 class Stages:
-    """A bar for work that names its parts: called before each with (name, how many are done, of how many)."""
+    """A bar for work in named parts: called before each part with (name, number of parts done, number of parts)."""
 
     def __init__(self, unit: str, label: str) -> None:
         self._unit, self._label = unit, label
@@ -32,7 +32,7 @@ class Stages:
         self._bar.update(int(done > 0))
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.close()
 

@@ -1,4 +1,4 @@
-"""Recordings of commands: their settings, the `Recorder` that these ask for, and serving it to a browser."""
+"""Recordings made by commands: their settings, their `Recorder`, and serving them to a browser."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mjwrap.cli.common.output import check_unread, opened
 from mjwrap.cli.common.stopping import Stopped
 from mjwrap.recording import Recorder, Server
 
-LOCAL = "local"  # stands for the viewer on this machine
+LOCAL = "local"  # the viewer on this machine
 
 
 @dataclass(frozen=True)
 class RecordingSettings:
-    """Where a recording goes, and how it is made.
+    """The settings of a recording.
 
-    path: a file, or None. connect: the address of a viewer, LOCAL for the one on this machine, or empty. rate [Hz],
+    path: a file, or None. connect: the address of a viewer, LOCAL for the viewer on this machine, or empty. rate [Hz],
     groups (names of muscles by group) and force_scale [m/N] as `Recorder` takes them.
     """
 
@@ -30,14 +30,14 @@ class RecordingSettings:
 
     @property
     def wanted(self) -> bool:
-        """Whether anything is to be recorded."""
+        """Whether a recording is asked for."""
         return bool(self.path or self.connect)
 
 
 def open_recorder(
     settings: RecordingSettings, model: Any, muscles: Any, stack: contextlib.ExitStack
 ) -> Recorder:
-    """Return the recorder that the settings ask for, to be closed by `stack`."""
+    """Return the recorder of the settings; `stack` closes it."""
     if settings.path is not None:
         check_unread(settings.path, "--record")
     recorder = opened(
@@ -55,13 +55,13 @@ def open_recorder(
 
 
 def end(server: Server) -> None:
-    """End a server."""
+    """Stop a server."""
     server.process.terminate()
     server.process.wait()
 
 
 def serve_until_stopped(server: Server, tell: Callable[[], object]) -> int:
-    """Tell where, and serve until Ctrl-C or the end of the server; return the exit code."""
+    """Print the address, and serve until Ctrl-C or until the server ends; return the exit code."""
     try:
         tell()
         return server.process.wait()

@@ -1,4 +1,4 @@
-"""Stopping a command by Ctrl-C, kill or a closed terminal, and the exit codes for that."""
+"""Stop a command by Ctrl-C, kill or a closed terminal, with the exit codes of these."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from mjwrap.files.atomic import STOPPING
 
 
 class Stopped(KeyboardInterrupt):
-    """A command was asked to end; `number` is the signal's, `name` what a person calls it."""
+    """A command was asked to end by a signal; name: "Ctrl-C", or the signal's name; code: the exit code."""
 
     def __init__(self, number: int = signal.SIGINT) -> None:
         super().__init__()
         self.name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
-        self.code = 128 + number  # the exit code, as shells have it
+        self.code = 128 + number  # the exit code that shells use
 
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
-    """Raise `Stopped` where one of the signals comes inside a with block; those that are ignored stay so (nohup)."""
+    """Raise `Stopped` if a signal arrives inside a with block; ignored signals stay ignored (nohup)."""
     with _handled(_stop):
         yield
 
 
 class Interrupt:
-    """A signal asks a loop to end: look at `asked`, a `Stopped` then, once a turn. A second one stops at once."""
+    """Let a loop end after a signal: the loop tests `asked`, a `Stopped` or None. A second signal stops at once."""
 
     def __init__(self) -> None:
         self.asked: Stopped | None = None
@@ -69,7 +69,7 @@ def _stop(number: int, _: object) -> NoReturn:
 
 
 def _terminal_is_gone(number: int) -> None:
-    """Where the terminal was closed, say what is said to nobody: writing to it would be an error."""
+    """If the signal is SIGHUP, discard further output: writing to a closed terminal is an error."""
     if signal.Signals(number).name != "SIGHUP":
         return
     for stream in (sys.stdout, sys.stderr):
@@ -79,7 +79,7 @@ def _terminal_is_gone(number: int) -> None:
 
 
 def silence(number: int) -> None:
-    """Let what is written to a file descriptor go nowhere."""
+    """Discard everything that is written to a file descriptor."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, number)
     os.close(nowhere)

@@ -1,1 +1,1 @@
-"""`mjwrap compare`: MuJoCo's tendons beside mjwrap's paths."""
+"""`mjwrap compare`: compare MuJoCo's tendons with mjwrap's paths."""

@@ -1,10 +1,11 @@
-"""Compare MuJoCo's built-in tendon wrapping with mjwrap's paths on the same model, side by side.
+"""Compare MuJoCo's built-in tendon wrapping with mjwrap's paths on the same model.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes. Every joint is swept over its
-range, around the start pose and around the middle of all ranges, and random poses are drawn. Each path is judged by
-its geometry: is it straight or a true geodesic, tangential where it meets the surface, nowhere below it, and a local
-minimum of length? Where the two differ, the verdict says which is right and why. Then both run forward with the same
-controls.
+MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+
+Every joint is swept over its range, around the start pose and around further poses, and random poses are drawn. Each
+path is judged by its geometry: it must be straight or a geodesic on the surface, meet the surface tangentially, never
+pass below it, and be a local minimum of length. If the two paths differ, a verdict says which one is right, and why.
+Then both models are simulated with the same controls.
 
 Examples:
   mjwrap compare models/elbow/elbow.xml --plot compare.png
@@ -25,67 +26,84 @@ from mjwrap.cli.compare.comparing import CompareSettings, GivenTables, compare
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Say which arguments there are."""
-    add_model(parser, "start pose", "of all that is random")
+    """Add the arguments of the command."""
+    add_model(parser, "keyframe of the start pose", "seed of random poses, velocities and patterns")
     add = parser.add_argument
-    add("--muscles", nargs="+", metavar="NAME", help="only these (* and ? stand for anything)")
+    add(
+        "--muscles",
+        nargs="+",
+        metavar="NAME",
+        help="compare only these muscles (* and ? match any characters)",
+    )
     add(
         "--samples",
         type=at_least(3),
         default=41,
         metavar="N",
-        help="poses of a sweep, and random ones (%(default)s)",
+        help="number of poses along a sweep, and of random poses (default %(default)s)",
     )
     add(
         "--bases",
         type=at_least(0),
         default=8,
         metavar="N",
-        help="further poses to sweep around (%(default)s)",
+        help="number of further poses to sweep around (default %(default)s)",
     )
     add(
-        "--duration", type=not_negative, default=1.0, metavar="S", help="of the motion; 0: none (%(default)s)"
+        "--duration",
+        type=not_negative,
+        default=1.0,
+        metavar="S",
+        help="duration of the simulation; 0: no simulation (default %(default)s s)",
     )
     add(
         "--excitation",
         nargs="+",
         default=["random"],
         metavar="PATTERN",
-        help="as mjwrap run takes it (random)",
+        help="excitation in the simulation, as for mjwrap run (default: random)",
     )
-    add("--law", choices=("mujoco", "declared"), default="mujoco", help="in mjwrap's run: MuJoCo's own curves, so that "
-        "both differ by the path alone, or the declared law")  # fmt: skip
-    add("--states", metavar="FILE", help="a motion (.sto, .mot, .csv, .npz) at which other tables were made")
-    add("--lengths", metavar="FILE", help="OpenSim's table of lengths along --states, to compare with both")
+    add("--law", choices=("mujoco", "declared"), default="mujoco", help="muscle law in mjwrap's simulation. mujoco: "
+        "MuJoCo's curves, so that only the paths differ (default); declared: each muscle's own law")  # fmt: skip
+    add(
+        "--states",
+        metavar="FILE",
+        help="motion (.sto, .mot, .csv, .npz) along which the other tables were computed",
+    )
+    add(
+        "--lengths",
+        metavar="FILE",
+        help="table of lengths along --states, such as OpenSim's, to compare with both",
+    )
     add(
         "--moment-arms",
         nargs="+",
         default=[],
         metavar="JOINT=FILE",
-        help="OpenSim's tables of moment arms there",
+        help="tables of moment arms about a joint along --states, such as OpenSim's",
     )
-    add("--plot", metavar="FILE.png", help="picture of it all (png, pdf, svg)")
-    add("--report", metavar="FILE.html", help="a page with a table of all muscles, plots and verdicts")
-    add("--csv", metavar="FILE.csv", help="a row for every muscle and pose that tells something; with tables of "
-        "another program FILE_tables.csv too")  # fmt: skip
+    add("--plot", metavar="FILE.png", help="plot the comparison (.png, .pdf, .svg)")
+    add("--report", metavar="FILE.html", help="write a page with a table of all muscles, plots and verdicts")
+    add("--csv", metavar="FILE.csv", help="write a row for every muscle and pose, without sweeps that "
+        "change nothing; with tables of another program also FILE_tables.csv")  # fmt: skip
     add(
         "--csv-all",
         action="store_true",
-        help="a row for every muscle and pose: hundreds of MB for a whole arm",
+        help="write all rows to --csv: hundreds of MB for a whole arm",
     )
-    add_json(parser, "all figures")
-    add("--check", action="store_true", help="exit code 1 where mjwrap is not right")
+    add_json(parser, "write all results")
+    add("--check", action="store_true", help="exit with code 1 if a path of mjwrap is wrong")
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Compare, and return the exit code."""
+    """Run the command and return its exit code."""
     return compare(settings(options))
 
 
 def settings(options: argparse.Namespace) -> CompareSettings:
-    """Return what the arguments ask for; `UserError` where they do not fit together."""
+    """Convert the arguments to settings; raises `UserError` if they contradict each other."""
     if options.csv_all and not options.csv:
-        raise UserError("--csv-all says what a table holds: it goes with --csv")
+        raise UserError("--csv-all needs a table: add --csv")
     return CompareSettings(
         model=options.model,
         keyframe=options.keyframe,
@@ -110,7 +128,7 @@ def settings(options: argparse.Namespace) -> CompareSettings:
 def _given_tables(states: str | None, lengths: str | None, arms: Sequence[str]) -> GivenTables | None:
     if not lengths and not arms:
         if states:
-            raise UserError("--states needs --lengths or --moment-arms: tables to compare at these states")
+            raise UserError("--states needs --lengths or --moment-arms: tables to compare with")
         return None
     if not states:
         raise UserError("--lengths and --moment-arms need --states: the motion at which they were computed")

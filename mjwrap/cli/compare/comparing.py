@@ -1,4 +1,4 @@
-"""Compare MuJoCo's tendons with mjwrap's paths, and report as text, values, plot, page and tables."""
+"""Compare MuJoCo's tendons with mjwrap's paths; report as text, values, plot, page and tables."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mjwrap.comparison import (
     verdict,
     with_native_laws,
 )
-from mjwrap.comparison.tables import Beside
+from mjwrap.comparison.tables import TableColumn
 from mjwrap.mjcf import dof_names
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import load, start_keyframe, start_state
@@ -36,7 +36,7 @@ from mjwrap.text import counted
 
 @dataclass(frozen=True)
 class GivenTables:
-    """Files of another program: states of a motion, lengths there, and moment arms there by joint."""
+    """Files of another program: states of a motion, lengths along it, and moment arms along it by joint."""
 
     states: str
     lengths: str | None
@@ -48,10 +48,11 @@ class CompareSettings:
     """The settings of `mjwrap compare`.
 
     model: a file, or "myo_sim:NAME". keyframe: the start pose, None for qpos0. muscles: patterns of names, None for
-    all. samples: poses of a sweep, and random ones; bases: further poses to sweep around. duration: of the motion [s],
-    0 for none; excitation in it, as `Excitation` takes it. law: "mujoco" runs both with MuJoCo's curves, "declared"
-    mjwrap with the declared law. plot, page, csv, json: files, or None; json may be "-" for standard output. csv_all: a
-    row for every pose. check: exit code 1 where mjwrap is not right. command: the line that makes this comparison.
+    all. samples: number of poses along a sweep, and of random poses. bases: number of further poses to sweep around.
+    duration: of the simulation [s], 0 for none. excitation: as `Excitation` takes it. law: "mujoco" simulates both with
+    MuJoCo's curves, "declared" mjwrap with the declared law. plot, page, csv, json: files, or None; json may be "-" for
+    standard output. csv_all: write every row to csv. check: exit code 1 if a path of mjwrap is wrong. command: the
+    command line of this comparison.
     """
 
     model: str
@@ -74,13 +75,13 @@ class CompareSettings:
 
 
 def compare(settings: CompareSettings) -> int:
-    """Compare, and say and write what came of it; return the exit code."""
+    """Compare, report, write the files, and return the exit code."""
     model = load(settings.model)
     key = start_keyframe(model, settings.keyframe)
     start = start_state(model, key)
     muscles = MuscleSystem(model)
     names = choose(muscles, settings.muscles)
-    Excitation(muscles, settings.excitation, settings.seed)  # so that a mistake in it shows before the work
+    Excitation(muscles, settings.excitation, settings.seed)  # a mistake here is reported early
     plot = open_output(settings.plot, "--plot", ".png", ".pdf", ".svg") if settings.plot else None
     page = open_output(settings.page, "--report", ".html", ".htm") if settings.page else None
     table = open_output(settings.csv, "--csv", ".csv") if settings.csv else None
@@ -88,10 +89,10 @@ def compare(settings: CompareSettings) -> int:
     given = read_tables(settings.given, model, muscles, start) if settings.given else None
     if plot is not None or page is not None:
         need_matplotlib()
-    beside: list[Beside] = []
-    tables = compare_tables(model, *given, each=beside.append) if given is not None else []
+    columns: list[TableColumn] = []
+    tables = compare_tables(model, *given, each=columns.append) if given is not None else []
     if settings.csv and given is not None:
-        write_tables(open_output(tables_path(settings.csv), "--csv", ".csv"), beside)
+        write_tables(open_output(tables_path(settings.csv), "--csv", ".csv"), columns)
     rows = PoseRows(table, dof_names(model), settings.csv_all) if table is not None else None
     found = compare_all(model, names, settings, start, rows)
     verdicts = {
@@ -107,7 +108,7 @@ def compare(settings: CompareSettings) -> int:
     tell_tables(report.say, tables)
     motion = None
     if settings.duration > 0.0 and not model.nv:
-        report.say("\nno motion: the model has no joint")
+        report.say("\nno simulation: the model has no joint")
     elif settings.duration > 0.0:
         moved, changed = with_native_laws(model) if settings.law == "mujoco" else (model, [])
         motion = compare_motion(moved, settings.excitation, settings.duration, key=key, seed=settings.seed)
@@ -134,7 +135,7 @@ def compare(settings: CompareSettings) -> int:
 
 
 def tables_path(path: str) -> str:
-    """Return the name of the file beside `--csv` that the given tables go to."""
+    """Return the file for the given tables, beside the file of `--csv`."""
     return str(Path(path).with_name(f"{Path(path).stem}_tables.csv"))
 
 
@@ -151,7 +152,7 @@ def compare_all(
     model: mujoco.MjModel, names: list[str] | None, settings: CompareSettings, start: mujoco.MjData,
     rows: PoseRows | None,
 ) -> PoseComparison:  # fmt: skip
-    """Compare at all poses, with a progress bar."""
+    """Compare at all poses with a progress bar."""
     with contextlib.closing(Stages("motions", "comparing")) as progress:
         return compare_poses(
             model, names=names, samples=settings.samples, bases=settings.bases, seed=settings.seed,

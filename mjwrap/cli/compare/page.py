@@ -1,7 +1,7 @@
-"""A comparison as one HTML page: what it found in short, a table of all muscles, and a section for each that differs.
+"""A comparison as one HTML page: a summary, a table of all muscles, and a section for each muscle.
 
-The page stands alone: its pictures are inside, and it loads nothing. report.html.j2 holds its HTML and escapes every
-name; here is what is filled in.
+The page contains its pictures and loads no other file. The template report.html.j2 holds the HTML and escapes every
+name; this module computes the values that are filled in.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from mjwrap.text import counted
 _RIGHT = {
     "both": "both",
     "mjwrap": "mjwrap",
-    "mjwrap in motion": "both; in motion mjwrap",
+    "mjwrap in motion": "both; mjwrap in motion",
     "MuJoCo": "MuJoCo",
     "neither": "no path exists",
-    "-": "stays native",
+    "-": "stays with MuJoCo",
 }
 _PROGRAMS = ("MuJoCo", "mjwrap")
 
@@ -52,7 +52,7 @@ def write_page(
     motion: MotionDifference | None,
     tables: Sequence[TableDifference] = (),
 ) -> None:
-    """Write the page and give the file its name; command: the line that makes it again."""
+    """Write the page; command: the command line that makes it again."""
     page = _template().render(
         model=model,
         command=command,
@@ -86,33 +86,35 @@ def _template() -> jinja2.Template:
 
 
 def _facts(found: PoseComparison) -> list[dict[str, object]]:
-    """Return the figures that say most: a number, what it counts, and in brief what else is known of it."""
+    """Return the most important numbers, each with what it counts."""
     both = [s for s in found.muscles.values() if not s.native_only]
     equal = sum(s.counts[Outcome.AGREE.name] == s.poses for s in both)
-    facts: list[tuple[int, str, str]] = [
-        (len(both), f"muscles compared at {found.poses} poses each", ""),
-        (equal, "equal at every pose", ""),
-        (len(both) - equal, "differ somewhere", ""),
-        (len(found.muscles) - len(both), "stay with MuJoCo's own tendon", ""),
+    facts: list[tuple[int, str]] = [
+        (len(both), f"muscles compared at {found.poses} poses each"),
+        (equal, "equal at every pose"),
+        (len(both) - equal, "differ at some pose"),
+        (len(found.muscles) - len(both), "stay with MuJoCo's own tendon"),
     ]
     for program, paths in (("MuJoCo", "tendons"), ("mjwrap", "paths")):
         jumps = [j for j in found.jumps if j.program == program]
-        muscles = counted(len({j.muscle for j in jumps}), "muscle")
-        what = f"jumps of {program}'s {paths} along the sweeps{starred(jumps)}"
-        facts.append((len(jumps), what, f"of {muscles}, {_largest(jumps)}" if jumps else ""))
-    facts.append((found.at_fault, "poses at which mjwrap is at fault", ""))
-    return [{"number": number, "what": what, "more": more} for number, what, more in facts]
+        what = f"jumps of {program}'s {paths} along the sweeps"
+        if jumps:
+            muscles = counted(len({j.muscle for j in jumps}), "muscle")
+            what += f", in {muscles}{starred(jumps)}; the largest is {_largest(jumps)}"
+        facts.append((len(jumps), what))
+    facts.append((found.at_fault, "poses at which mjwrap is wrong"))
+    return [{"number": number, "what": what} for number, what in facts]
 
 
 def _largest(jumps: Sequence[Jump]) -> str:
-    """Say how large the largest of these jumps is: in length, or in moment arm where no length jumps."""
+    """Return the size of the largest jump as text: in length, or in moment arm if no length jumps."""
     length = max(abs(j.length) for j in jumps)
     arm = max(abs(j.slope) for j in jumps)
-    return f"to {1e3 * length:.3g} mm" if length else f"arm only, to {1e3 * arm:.3g} mm"
+    return f"{1e3 * length:.3g} mm" if length else f"{1e3 * arm:.3g} mm of the moment arm"
 
 
 def _muscle(s: MuscleSummary, found: PoseComparison, verdict: Verdict) -> dict[str, object]:
-    """Return what the page tells of one muscle: its row in the table of all, and its section."""
+    """Return the values of one muscle: for its row in the table of all muscles, and for its section."""
     jumps = [jump for jump in found.jumps if jump.muscle == s.name]
     by_program = [[jump for jump in jumps if jump.program == program] for program in _PROGRAMS]
     differs = not s.native_only and s.counts[Outcome.AGREE.name] < s.poses
@@ -125,7 +127,7 @@ def _muscle(s: MuscleSummary, found: PoseComparison, verdict: Verdict) -> dict[s
         "compared": not s.native_only,
         "shares": _shares(s),
         "gaps": [x.difference for x in (s.length, s.velocity, s.moment_arm)],
-        "jump_counts": [f"{len(mine)}, {_largest(mine)}" if mine else "" for mine in by_program],
+        "jump_counts": [f"{len(mine)}; largest {_largest(mine)}" if mine else "" for mine in by_program],
         "open": differs or bool(jumps),
         "drawing": _sweep(s, found) if drawn else "",
         "jumps": _jumps(jumps),
@@ -134,7 +136,7 @@ def _muscle(s: MuscleSummary, found: PoseComparison, verdict: Verdict) -> dict[s
 
 
 def _shares(s: MuscleSummary) -> list[dict[str, object]]:
-    """Return the shares of a muscle's outcomes."""
+    """Return the share of each outcome in a muscle's poses."""
     return [
         {
             "colour": COLOURS[outcome],
@@ -168,7 +170,7 @@ def _extremes(s: MuscleSummary) -> list[list[str]]:
 
 
 def _tables(tables: Sequence[TableDifference]) -> list[list[str]]:
-    """Return the rows of the differences from another program's tables, the worst first."""
+    """Return the rows of the differences from another program's tables, largest first."""
     return [
         [d.muscle, d.program, f"moment arm, {d.about}" if d.about else "length", f"{d.rows}"]
         + [millimetres(x, 4) for x in (d.mean, d.spread, d.largest)]
@@ -181,8 +183,8 @@ def _motion(motion: MotionDifference) -> dict[str, str]:
     dof, gap, when = motion.worst()
     last, final = motion.final()
     told = (
-        f"Over {motion.time[-1]:g} s mjwrap differs most from MuJoCo by {gap:+.3g} ({dof}, at {when:g} s), at "
-        f"the end {final:+.3g} ({last}) [rad, m]. {motion.stopped}"
+        f"Over {motion.time[-1]:g} s the largest difference of mjwrap from MuJoCo is {gap:+.3g} ({dof}, at {when:g} "
+        f"s); at the end it is {final:+.3g} ({last}) [rad, m]. {motion.stopped}"
     )
     figure, pair = plt.subplots(1, 2, figsize=(10.0, 2.8), layout="constrained")
     draw_motion(pair, motion)
@@ -196,7 +198,7 @@ def _sweep(s: MuscleSummary, found: PoseComparison) -> str:
 
 
 def _svg(figure: Any) -> str:
-    """Return a figure as SVG, its ids made its own, and close it."""
+    """Return a figure as SVG with ids that no other figure uses, and close it."""
     text = io.StringIO()
     with plt.rc_context({"svg.fonttype": "none", "svg.hashsalt": "mjwrap"}):
         figure.savefig(text, format="svg", metadata={"Date": None})

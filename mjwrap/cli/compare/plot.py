@@ -1,4 +1,4 @@
-"""The picture of a comparison: outcomes by muscle, the sweeps that show most, and the motion of both."""
+"""Plot a comparison: outcomes by muscle, the sweeps with the largest differences, and the motion of both models."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SWEEPS = 5  # muscles whose sweeps are shown
 def plot_comparison(
     output: PartFile, title: str, found: PoseComparison, motion: MotionDifference | None
 ) -> None:
-    """Draw a comparison and give the file its name."""
+    """Plot a comparison and write the file."""
     shown = _telling(found)
     rows = len(shown) + (1 if motion is not None and motion.difference.size else 0)
     both = [s for s in found.muscles.values() if not s.native_only]
@@ -52,7 +52,7 @@ def plot_comparison(
 
 
 def _telling(found: PoseComparison) -> list[MuscleSummary]:
-    """Return the muscles whose sweeps show most: jumps and differences first, then the largest changes of length."""
+    """Return the muscles whose sweeps are plotted: jumps and differences first, then the largest changes of length."""
     jumps = {
         name: sum(abs(j.length) + abs(j.slope) for j in found.jumps if j.muscle == name)
         for name in found.muscles
@@ -71,7 +71,7 @@ def _telling(found: PoseComparison) -> list[MuscleSummary]:
 
 
 def draw_outcomes(axis: Any, both: list[MuscleSummary]) -> None:
-    """Draw the share of poses of each outcome, a bar a muscle."""
+    """Draw a bar for each muscle: the share of poses of each outcome."""
     start = np.zeros(len(both))
     for outcome in Outcome:
         share = np.array([100.0 * s.counts[outcome.name] / max(s.poses, 1) for s in both])
@@ -87,7 +87,7 @@ def draw_outcomes(axis: Any, both: list[MuscleSummary]) -> None:
 
 
 def draw_sweep(pair: Any, summary: MuscleSummary, found: PoseComparison) -> None:
-    """Draw length and moment arm of both along one sweep."""
+    """Draw the lengths and moment arms of both programs along one sweep."""
     curves = summary.curves
     assert curves is not None
     axes = (
@@ -113,7 +113,7 @@ def draw_sweep(pair: Any, summary: MuscleSummary, found: PoseComparison) -> None
 
 
 def draw_motion(pair: Any, motion: MotionDifference) -> None:
-    """Draw the joint that differs most in both runs, and the difference of the six that differ most."""
+    """Draw the joint that differs most in both simulations, and the differences of the six that differ most."""
     order = np.argsort(-np.abs(motion.difference).max(axis=0))[:6]
     for d in order:
         pair[1].plot(motion.time, motion.difference[:, d], linewidth=1.2, label=motion.dofs[d])

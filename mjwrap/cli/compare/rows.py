@@ -1,4 +1,4 @@
-"""A comparison as rows of CSV files: every muscle and pose, or those that tell something; and the given tables."""
+"""A comparison as rows of CSV files: a row for each muscle and pose, and a row for each row of the given tables."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from mjwrap.comparison import AGREE, Outcome
 from mjwrap.comparison.judge_geodesic import Fault
-from mjwrap.comparison.tables import Beside
-from mjwrap.comparison.twins import Batch, Twin
+from mjwrap.comparison.paired_evaluation import Batch, MusclePair
+from mjwrap.comparison.tables import TableColumn
 from mjwrap.comparison.verdict import differences, outcomes, slope
 from mjwrap.files.atomic import PartFile
 from mjwrap.poses.joint_sweeps import PoseSequence
@@ -27,12 +27,12 @@ _TABLES = ("time", "muscle", "quantity", "about", "table", "mujoco", "mjwrap")
 
 
 class PoseRows:
-    """A CSV file with a row for every muscle and pose, written while they are compared. SI units.
+    """A CSV file with a row for each muscle and pose, written during the comparison. SI units.
 
-    Unless `every` pose is asked for, sweeps that do not move a muscle are left out, and so are the poses of sweeps
-    around further poses (base > 0) at which both programs are equal. Moment arms are −∂l/∂q: about the joint that is
-    swept, else about the one whose moment arm differs most, or is largest. What mjwrap does not have is left blank.
-    dofs: the names of the degrees of freedom.
+    Unless `every` is true, sweeps that do not move a muscle are left out, and so are the poses of sweeps around further
+    poses (base > 0) at which both programs are equal. Moment arms are −∂l/∂q: about the joint that is swept; at random
+    poses about the joint whose moment arm differs most, or is largest. Cells of values that mjwrap does not have are
+    empty. dofs: the names of the degrees of freedom.
     """
 
     def __init__(self, output: PartFile, dofs: Sequence[str], every: bool) -> None:
@@ -45,34 +45,36 @@ class PoseRows:
     def add(self, batch: Batch) -> None:
         """Write one motion."""
         with self._output.writing():
-            for twin in batch.twins:
-                if twin.mjwrap is not None:
-                    self._add(batch.motion, twin)
+            for pair in batch.pairs:
+                if pair.mjwrap is not None:
+                    self._add(batch.motion, pair)
 
-    def _add(self, motion: PoseSequence, twin: Twin) -> None:
-        native, mine = twin.native, twin.mjwrap
+    def _add(self, motion: PoseSequence, pair: MusclePair) -> None:
+        native, mine = pair.native, pair.mjwrap
         assert mine is not None
-        found, gaps = outcomes(twin, motion.continuous), differences(native, mine)
-        about, arms = _moment_arms(motion, twin, self._dofs)
+        found, gaps = outcomes(pair, motion.continuous), differences(native, mine)
+        about, arms = _moment_arms(motion, pair, self._dofs)
         equal = found == Outcome.AGREE
         left_out = np.zeros(len(motion.at), dtype=np.bool_)
         if motion.continuous and not self._every:
-            still = not slope(mine, motion)[twin.status == 0].any()  # exactly 0 where no body of it moves
+            still = not slope(mine, motion)[
+                pair.status == 0
+            ].any()  # exactly 0 if no body of the muscle moves
             left_out = equal & (still or motion.base > 0)
         self.of += len(motion.at)
         self.rows += int((~left_out).sum())
         for k in np.flatnonzero(~left_out):
-            there = twin.status[k] == 0
+            there = pair.status[k] == 0
             own = [float(x[k]) if there else "" for x in (mine.length, mine.velocity, arms[1], gaps[2])]
             self._writer.writerow([
-                motion.name, motion.base, float(motion.at[k]), twin.name, Outcome(int(found[k])).name,
+                motion.name, motion.base, float(motion.at[k]), pair.name, Outcome(int(found[k])).name,
                 float(native.length[k]), own[0], float(native.velocity[k]), own[1],
                 about[k], float(arms[0, k]), own[2], own[3],
-                *(Fault(int(x.fault[k])).name for x in (native, mine)), int(twin.status[k]),
+                *(Fault(int(x.fault[k])).name for x in (native, mine)), int(pair.status[k]),
             ])  # fmt: skip
 
     def close(self) -> str:
-        """Finish the file; say how large it is, and what was left out."""
+        """Finish the file; return its size and the number of rows left out as text."""
         self._output.publish()
         size = f"{self._output.path.stat().st_size / 1e6:.1f} MB"
         if self.rows == self.of:
@@ -80,9 +82,9 @@ class PoseRows:
         return f"{self.rows} of {self.of} rows, {size}; all of them with --csv-all"
 
 
-def _moment_arms(motion: PoseSequence, twin: Twin, dofs: list[str]) -> tuple[list[str], Array]:
-    """Return about what (T,), and MuJoCo's and mjwrap's moment arms (2, T) [m]."""
-    native, mine = twin.native, twin.mjwrap
+def _moment_arms(motion: PoseSequence, pair: MusclePair, dofs: list[str]) -> tuple[list[str], Array]:
+    """Return the joint (T,) of each moment arm, and the moment arms of MuJoCo and mjwrap (2, T) [m]."""
+    native, mine = pair.native, pair.mjwrap
     assert mine is not None
     count = len(motion.at)
     if motion.continuous:
@@ -96,15 +98,15 @@ def _moment_arms(motion: PoseSequence, twin: Twin, dofs: list[str]) -> tuple[lis
     return [dofs[d] for d in place], arms
 
 
-def write_tables(output: PartFile, given: Sequence[Beside]) -> None:
-    """Write a CSV file with a row for every row and muscle of the given tables, both programs beside it. SI units."""
+def write_tables(output: PartFile, given: Sequence[TableColumn]) -> None:
+    """Write a CSV file with a row for each muscle and row of the given tables, with both programs' values. SI units."""
     writer = csv.writer(output.open_text())
     with output.writing():
         writer.writerow(_TABLES)
-        for beside in given:
-            for k, time in enumerate(beside.time.tolist()):
-                figures = (float(x[k]) for x in (beside.table, beside.mujoco, beside.mjwrap))
+        for column in given:
+            for k, time in enumerate(column.time.tolist()):
+                figures = (float(x[k]) for x in (column.table, column.mujoco, column.mjwrap))
                 cells = ["" if np.isnan(x) else x for x in figures]
-                quantity = "moment arm" if beside.about else "length"
-                writer.writerow([time, beside.muscle, quantity, beside.about, *cells])
+                quantity = "moment arm" if column.about else "length"
+                writer.writerow([time, column.muscle, quantity, column.about, *cells])
     output.publish()

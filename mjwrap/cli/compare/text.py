@@ -1,4 +1,4 @@
-"""A comparison as text and as values."""
+"""A comparison as text, and as values for JSON."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mjwrap.text import aligned, counted
 TITLES = {
     Outcome.AGREE: "equal",
     Outcome.OTHER_BRANCH: "other way round",
-    Outcome.MUJOCO_NOT_GEODESIC: "MuJoCo no geodesic",
+    Outcome.MUJOCO_NOT_GEODESIC: "MuJoCo not a geodesic",
     Outcome.NO_PATH: "no path exists",
     Outcome.MJWRAP_FAILED: "mjwrap failed",
     Outcome.MJWRAP_WRONG: "mjwrap wrong",
@@ -36,15 +36,15 @@ Say = Callable[[str], object]
 
 
 def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) -> None:
-    """Say counts and the largest differences of every muscle, then the verdicts and the jumps."""
+    """Print the outcomes and the largest differences of each muscle, then the verdicts and the jumps."""
     both = [s for s in found.muscles.values() if not s.native_only]
     if both:
         _tell_table(say, found, both)
-    say("\nwhich is right, and why")
+    say("\nwhich program is right, and why")
     equal = [s for s in both if s.counts[Outcome.AGREE.name] == s.poses and verdicts[s.name].right == "both"]
     if equal:
         length, velocity, arm = np.max([s.agreement for s in equal], axis=0)
-        told = f"to {length:.0e} m, {velocity:.0e} m/s, {arm:.0e} m/rad"
+        told = f"within {length:.0e} m, {velocity:.0e} m/s, {arm:.0e} m/rad"
         say(f"  both, equal at every pose {told}: {', '.join(s.name for s in equal)}")
     for name, (right, why) in verdicts.items():
         if found.muscles[name] not in equal:
@@ -53,7 +53,7 @@ def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) ->
         say(f"  {name}: not compared: {why}")
     far = [s for s in both if s.length.difference > AGREE]
     if far:
-        say("\nwhere lengths differ most")
+        say("\nlargest differences of length")
         for s in sorted(far, key=lambda s: -s.length.difference)[:10]:
             say(
                 f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {where(s.length)}"
@@ -83,7 +83,7 @@ def _tell_table(say: Say, found: PoseComparison, both: list[MuscleSummary]) -> N
 
 
 def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
-    """Say the largest jump of each program, muscle and joint."""
+    """Print the largest jump of each program, muscle and joint."""
     largest: dict[tuple[str, str, str], Jump] = {}
     for jump in jumps:
         key = jump.program, jump.muscle, jump.sweep
@@ -98,19 +98,19 @@ def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
 
 
 def starred(jumps: Sequence[Jump]) -> str:
-    """Say how many of some jumps are at joints that were moved without those that they are coupled to."""
+    """Return, as text, how many of the jumps are at coupled joints that were moved alone; empty if none."""
     alone = sum(jump.alone for jump in jumps)
-    return f", {alone} of them (*) at joints that follow others and were moved alone" if alone else ""
+    return f", {alone} of them (*) at coupled joints that were moved alone" if alone else ""
 
 
 def millimetres(metres: float, digits: int = 3) -> str:
-    """Return a difference in mm with its sign; 0 for what the digits cannot show."""
+    """Return a difference in mm with its sign, or "0" if its digits are all zero."""
     text = f"{1e3 * metres:+.{digits}f}"
     return text if float(text) else "0"
 
 
 def where(extreme: Extreme) -> str:
-    """Say where a largest difference was seen."""
+    """Return the place of a largest difference as text."""
     if extreme.motion in extreme.joints:
         return f"{extreme.motion} = {extreme.at:.6f}"
     told = ", ".join(f"{name} = {value:.4f}" for name, value in list(extreme.joints.items())[:6])
@@ -118,10 +118,10 @@ def where(extreme: Extreme) -> str:
 
 
 def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
-    """Say how far both programs are from another program's tables, the worst first."""
+    """Print the differences of both programs from another program's tables, largest first."""
     if not tables:
         return
-    say("\nbeside the given tables: program minus table, in mm; spread: rms without the mean")
+    say("\ndifferences from the given tables: program minus table, in mm; spread: rms without the mean")
     rows = [["muscle", "program", "quantity", "rows", "mean", "spread", "largest", "at [s]"]]
     for d in sorted(tables, key=lambda d: -d.spread):
         what = f"moment arm, {d.about}" if d.about else "length"
@@ -131,25 +131,25 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
 
 
 def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: Sequence[str]) -> None:
-    """Say how far the two runs drift apart."""
-    say(f"\nmotion over {motion.time[-1]:g} s, excitation {' '.join(entries)}, mjwrap minus MuJoCo")
+    """Print the differences between the two simulations."""
+    say(f"\nsimulation over {motion.time[-1]:g} s, excitation {' '.join(entries)}; mjwrap minus MuJoCo")
     if changed:
         those = counted(len(changed), "muscle")
-        say(f"  {those} of another law by MuJoCo's curves in both (--law declared: by their own)")
+        say(f"  {those} with another law: MuJoCo's curves in both (--law declared: their own law)")
     dof, gap, when = motion.worst()
     last, final = motion.final()
     say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")
     if motion.stopped:
         say(f"  ended early: {motion.stopped}")
     if motion.paths:
-        say("  mjwrap's run had no path (and held the last good force) for")
+        say("  muscles without a path in mjwrap's simulation (they kept their last valid force):")
         say("\n".join(f"    {line}" for line in motion.paths.splitlines()))
 
 
 def as_values(
     found: PoseComparison, verdicts: dict[str, Verdict], motion: MotionDifference | None
 ) -> dict[str, Any]:
-    """Return everything as values."""
+    """Return the comparison as values."""
     content: dict[str, Any] = {
         "mujoco": mujoco.__version__,
         "mjwrap": mjwrap.__version__,

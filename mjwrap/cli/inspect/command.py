@@ -1,8 +1,10 @@
-"""List the muscles of a model: what is taken over, by which law, over which surfaces, and what stays with MuJoCo.
+"""List the muscles of a model, with laws and wrapping surfaces, and report implausible parameters.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes. Then parameters that are
-implausible: all joints are moved over their ranges together, muscles run along geodesic paths. Limits that count as
-plausible: docs/parameters.md.
+MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+
+The list also names the actuators that stay with MuJoCo, and why. To judge the parameters, the joints are moved over
+their ranges, all together, to find the lengths that every muscle takes along its geodesic path. docs/parameters.md
+gives the limits of what is plausible.
 
 Examples:
   mjwrap inspect models/elbow/elbow.xml
@@ -20,35 +22,35 @@ from mjwrap.cli.inspect.inspecting import InspectSettings, inspect
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Say which arguments there are."""
-    add_model(parser, "rest pose", "of the drawn poses")
+    """Add the arguments of the command."""
+    add_model(parser, "keyframe of the rest pose", "seed of the random poses")
     add = parser.add_argument
     add(
         "--range",
         nargs="+",
         default=[],
         metavar="JOINT=LOW,HIGH",
-        help="of a joint, instead of the model's [rad, m]",
+        help="ranges of joints, in place of the model's [rad, m]",
     )
     add(
         "--quick",
         action="store_true",
-        help="judge the parameters and the rest pose only, not the joints' ranges",
+        help="judge only the parameters and the rest pose, without moving the joints",
     )
-    add_json(parser, "muscles, native actuators, findings, remarks and length ranges")
-    add("--strict", action="store_true", help="exit code 1 where something is implausible")
+    add_json(parser, "write muscles, native actuators, findings, remarks and length ranges")
+    add("--strict", action="store_true", help="exit with code 1 if something is implausible")
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Inspect, and return the exit code."""
+    """Run the command and return its exit code."""
     return inspect(settings(options))
 
 
 def settings(options: argparse.Namespace) -> InspectSettings:
-    """Return what the arguments ask for; `UserError` where they do not fit together."""
+    """Convert the arguments to settings; raises `UserError` if they contradict each other."""
     ranges = dict(_read_range(entry) for entry in options.range)
     if ranges and options.quick:
-        raise UserError("--range is for the joints' ranges, which --quick does not look at")
+        raise UserError("--range cannot be combined with --quick, which does not move the joints")
     return InspectSettings(
         model=options.model,
         keyframe=options.keyframe,
@@ -65,6 +67,6 @@ def _read_range(entry: str) -> tuple[str, tuple[float, float]]:
     name, _, text = entry.rpartition("=")
     ends = text.split(",")
     if not name or len(ends) != 2:
-        raise UserError(f"--range '{entry}' must be JOINT=LOW,HIGH")
+        raise UserError(f"--range '{entry}': write JOINT=LOW,HIGH")
     low, high = (number(end, f"--range '{entry}'") for end in ends)
     return name, (low, high)

@@ -1,4 +1,4 @@
-"""The declared muscles of a model, as a table and as values."""
+"""The declared muscles of a model as a table, and as values for JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import mujoco
 
-from mjwrap.calibration.judge import as_unit
+from mjwrap.calibration.plausibility import as_unit
 from mjwrap.mjcf import MuscleDeclaration, Node, Route, name_of
 from mjwrap.text import aligned
 
@@ -19,9 +19,9 @@ _WORDS = (0, 1, 5, 6)  # columns that hold no numbers
 
 
 def table(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> str:
-    """Return a line for each muscle: law, sizes, and the sites and surfaces that it runs over.
+    """Return a line for each muscle: law, sizes, and the sites and surfaces of its path.
 
-    l_opt, l_slack: optimal fibre and tendon slack length, for MuJoCo's law as its length range gives them.
+    l_opt, l_slack: optimal fibre length and tendon slack length; under MuJoCo's law computed from its length range.
     """
     rows: list[tuple[str, ...]] = [_HEAD]
     for muscle in muscles:
@@ -65,7 +65,7 @@ def _geom(model: mujoco.MjModel, geom: int) -> str:
 
 
 def as_values(model: mujoco.MjModel, muscle: MuscleDeclaration) -> dict[str, Any]:
-    """Return a declaration as plain values: names of elements, parameters of the law, sizes of surfaces."""
+    """Return a declaration as values: names of elements, parameters of the law, sizes of surfaces."""
     kinds = mujoco.mjtObj
     return {
         "name": muscle.name,

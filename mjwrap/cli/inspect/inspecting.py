@@ -20,9 +20,9 @@ from mjwrap.text import counted
 class InspectSettings:
     """The settings of `mjwrap inspect`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the rest pose, None for qpos0. seed: of the drawn poses. ranges: of
-    joints by name, instead of the model's [rad, m]. quick: judge the parameters and the rest pose only. strict: exit
-    code 1 where something is implausible. json: a file for the report as values, "-" for standard output, or None.
+    model: a file, or "myo_sim:NAME". keyframe: the rest pose, None for qpos0. seed: of the random poses. ranges: of
+    joints by name, in place of the model's [rad, m]. quick: judge only the parameters and the rest pose. strict: exit
+    code 1 if something is implausible. json: a file for the report as values, "-" for standard output, or None.
     """
 
     model: str
@@ -35,18 +35,20 @@ class InspectSettings:
 
 
 def inspect(settings: InspectSettings) -> int:
-    """Say what is declared, search, and say what was found; return the exit code."""
+    """List the muscles, judge their parameters, and return the exit code."""
     model = load(settings.model)
     rest = start_state(model, start_keyframe(model, settings.keyframe)).qpos
     joints = dict(settings.ranges)
-    JointSpace(copy.copy(model), rest, joints)  # so that a mistake in a range shows before the work
+    JointSpace(
+        copy.copy(model), rest, joints
+    )  # read first, so that a mistake in a range is reported before the work
     report = Report(settings.json)
     muscles = MuscleSystem(model)
     if not muscles.names and not muscles.native:
         raise UserError("the model has no muscles: nothing to inspect")
     report.say(
-        f"{settings.model}: {counted(muscles.n, 'muscle')} along geodesic paths, "
-        f"{len(muscles.native)} with MuJoCo's own"
+        f"{settings.model}: {counted(muscles.n, 'muscle')} with geodesic paths, "
+        f"{len(muscles.native)} with MuJoCo's own paths"
     )
     report.say(table(model, muscles.declarations))
     for name, reason in muscles.native.items():

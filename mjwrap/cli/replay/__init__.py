@@ -1,1 +1,1 @@
-"""`mjwrap replay`: look at recordings and states."""
+"""`mjwrap replay`: show recordings and tables of states."""

@@ -1,11 +1,12 @@
-"""Look at a recording, or at a file of states: in rerun's own viewer, in a browser, or say what it holds.
+"""Show a recording or a table of states in rerun's viewer or in a browser, or describe it.
 
-FILE is a recording (.rrd), or a table of states over time (.sto, .mot, .csv, .npz) of the model that --model names.
-Its columns: qpos:JOINT, qvel:JOINT, act:ACTUATOR or activation:MUSCLE and fiber_length:MUSCLE, as mjwrap run writes
-them; qpos[0] and so on; JOINT/value, JOINT/speed, MUSCLE/activation or just JOINT, as in OpenSim's files. An NPZ file
-may have arrays time, qpos, qvel and act instead. Paths and forces are computed again from them.
+FILE is a recording (.rrd), or a table of states over time (.sto, .mot, .csv, .npz) of the model given by --model. The
+columns of a table are named as by mjwrap run (qpos:JOINT, qvel:JOINT, act:ACTUATOR, or activation:MUSCLE and
+fiber_length:MUSCLE), by index (qpos[0] and so on), or as in OpenSim's files (JOINT/value, JOINT/speed,
+MUSCLE/activation, or JOINT alone). An NPZ file may contain arrays time, qpos, qvel and act instead. Paths and forces
+are computed again from the states.
 
-Without an option the viewer opens, or where there is no display the recording is served to a browser.
+Without options the viewer opens; if there is no display, the recording is served to a browser.
 
 Examples:
   mjwrap replay elbow.rrd
@@ -20,7 +21,9 @@ import argparse
 from pathlib import Path
 
 from mjwrap.cli.common.arguments import (
-    HOW,
+    INITIAL_POSE,
+    MODEL_HELP,
+    RECORDING_DETAILS,
     add_analysis,
     add_json,
     add_recording,
@@ -33,39 +36,49 @@ from mjwrap.cli.replay.settings import ReplaySettings, StatesSettings
 from mjwrap.cli.replay.showing import replay
 from mjwrap.files import SUFFIXES
 
-COLUMNS = "length,velocity,tension"  # of a table, unless others are asked for
+COLUMNS = "length,velocity,tension"  # default of --columns
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Say which arguments there are."""
+    """Add the arguments of the command."""
     add = parser.add_argument
     add("file", metavar="FILE", help="recording (.rrd), or table of states (.sto, .mot, .csv, .npz)")
     what = parser.add_mutually_exclusive_group()
-    add_serving(parser, what, "serve it")
-    what.add_argument("--info", action="store_true", help="say what it holds, and stop")
-    states = parser.add_argument_group("for a table of states")
-    states.add_argument("--model", metavar="MODEL", help="MJCF or MJB file, or myo_sim:NAME")
-    states.add_argument("--keyframe", metavar="NAME", help="what the table does not name is as there")
+    add_serving(parser, what, "serve the recording")
+    what.add_argument("--info", action="store_true", help="print the contents of FILE and stop")
+    states = parser.add_argument_group("options for a table of states")
+    states.add_argument("--model", metavar="MODEL", help=f"model of the states: {MODEL_HELP}")
+    states.add_argument(
+        "--keyframe",
+        metavar="NAME",
+        help=f"keyframe for values missing from the table (default: {INITIAL_POSE})",
+    )
     add_recording(states, states)
-    states.add_argument("--out", metavar="FILE", help="paths and forces as a table")
-    states.add_argument("--columns", default=COLUMNS, metavar="KINDS", help="what it holds, as mjwrap run has it "
-        "(default %(default)s)")  # fmt: skip
+    states.add_argument("--out", metavar="FILE", help="write the computed paths and forces as a table")
+    states.add_argument(
+        "--columns",
+        default=COLUMNS,
+        metavar="KINDS",
+        help="quantities in the table, as for mjwrap run (default %(default)s)",
+    )
     add_analysis(states.add_argument)
-    add_json(parser, "what the file holds")
+    add_json(parser, "write the contents of FILE")
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Show, record or describe a file, and return the exit code."""
+    """Run the command and return its exit code."""
     return replay(settings(options))
 
 
 def settings(options: argparse.Namespace) -> ReplaySettings:
-    """Return what the arguments ask for; `UserError` where they do not fit together."""
+    """Convert the arguments to settings; raises `UserError` if they contradict each other."""
     is_table = Path(options.file).suffix.lower() in SUFFIXES
-    for option in () if is_table else ("model", "keyframe", "record", "connect", *HOW, "out", "analysis"):
+    for option in (
+        () if is_table else ("model", "keyframe", "record", "connect", *RECORDING_DETAILS, "out", "analysis")
+    ):
         if getattr(options, option):
             raise UserError(
-                f"--{option.replace('_', '-')} goes with a table of states, and '{options.file}' is none"
+                f"--{option.replace('_', '-')} needs a table of states, and '{options.file}' is not one"
             )
     return ReplaySettings(
         file=options.file,
@@ -79,16 +92,16 @@ def settings(options: argparse.Namespace) -> ReplaySettings:
 
 def _states(options: argparse.Namespace) -> StatesSettings:
     if not options.model:
-        raise UserError(f"'{options.file}' is a table of states: --model says of which model")
+        raise UserError(f"'{options.file}' is a table of states: name its model with --model")
     if options.columns != COLUMNS and not options.out:
-        raise UserError("--columns says what a table holds: it goes with --out")
+        raise UserError("--columns needs a table: add --out")
     kept = options.record or options.out or options.analysis or options.connect
     if kept and options.serve:
         raise UserError(
-            "--serve is for what is not kept: leave --record, --connect, --out and --analysis away, or replay the "
-            "recording"
+            "--serve cannot be combined with --record, --connect, --out or --analysis; to see a written recording, "
+            "replay it"
         )
-    # what is neither kept nor only described is recorded for the viewer
+    # without an output and without --info or --json, a recording is made for the viewer
     recorded = bool(options.record or options.connect) or not (kept or options.info or options.json)
     return StatesSettings(
         model=options.model,

@@ -10,10 +10,10 @@ from mjwrap.cli.common.recorded import RecordingSettings
 
 @dataclass(frozen=True)
 class StatesSettings:
-    """What to do with a table of states.
+    """The settings for a table of states.
 
-    model: a file, or "myo_sim:NAME". keyframe: gives what the table does not name, None for qpos0. table: a file for
-    numbers of some kinds, or None. analysis: the prefix of tables in OpenSim's layout, or None.
+    model: a file, or "myo_sim:NAME". keyframe: gives the values that the table lacks, None for qpos0. table: a file for
+    the quantities named in `kinds`, or None. analysis: the prefix of tables in OpenSim's layout, or None.
     """
 
     model: str
@@ -25,7 +25,7 @@ class StatesSettings:
 
     @property
     def kept(self) -> bool:
-        """Whether anything is to stay."""
+        """Whether a file is written or a viewer connected."""
         return bool(self.recording.wanted or self.table or self.analysis)
 
 
@@ -33,8 +33,8 @@ class StatesSettings:
 class ReplaySettings:
     """The settings of `mjwrap replay`.
 
-    file: a recording, or a table of states, for which there are `states`. serve: show it in a browser, at `port`.
-    info: describe it only. json: the file that the description goes to as values, "-" for standard output, or None.
+    file: a recording, or a table of states; states: the settings for the latter. serve: show it in a browser, at
+    `port`. info: only describe it. json: a file for the description as values, "-" for standard output, or None.
     """
 
     file: str

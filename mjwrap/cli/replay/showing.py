@@ -18,7 +18,7 @@ from mjwrap.text import counted
 
 
 def replay(settings: ReplaySettings) -> int:
-    """Show, record or describe; a damaged file is an error here and not an empty viewer."""
+    """Show, record or describe a file; a damaged recording is an error, so that no empty viewer opens."""
     try:
         if settings.states is None:
             return show(settings, settings.file)
@@ -28,7 +28,7 @@ def replay(settings: ReplaySettings) -> int:
 
 
 def show(settings: ReplaySettings, path: str) -> int:
-    """Say what a recording holds, or show it."""
+    """Describe a recording, or show it."""
     summary = read_summary(path)
     if settings.info or settings.json:
         report = Report(settings.json)
@@ -38,13 +38,15 @@ def show(settings: ReplaySettings, path: str) -> int:
     if settings.serve or not has_display():
         with uninterrupted():
             server = serve(path, settings.port)
-        return serve_until_stopped(server, lambda: say(f"open {server.address}\nCtrl-C stops serving"))
+        return serve_until_stopped(server, lambda: say(f"open {server.address}\npress Ctrl-C to stop"))
     return open_native(path)
 
 
 def replay_states(settings: ReplaySettings, states: StatesSettings) -> int:
-    """Record what the states of a table look like, and show it, unless it is only to be kept."""
-    from mjwrap.cli.replay.states import recompute  # with the muscles, which a recording does not need
+    """Compute paths and forces at the states of a table; show the recording, unless only files were asked for."""
+    from mjwrap.cli.replay.states import (
+        recompute,  # loads the muscles, which showing a recording does not need
+    )
 
     if states.kept or settings.info or settings.json:
         recompute(settings.file, states, json=settings.json)
@@ -56,7 +58,7 @@ def replay_states(settings: ReplaySettings, states: StatesSettings) -> int:
 
 
 def describe(summary: Summary) -> str:
-    """What a recording holds, a fact a line."""
+    """Return the contents of a recording, one fact per line."""
     lines = [
         f"file      {summary.path} ({summary.path.stat().st_size / 1e6:.1f} MB)",
         f"model     {summary.model}",

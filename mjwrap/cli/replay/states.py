@@ -1,4 +1,4 @@
-"""Paths and forces at the states of a table, as a recording, a table, or both."""
+"""Compute paths and forces at the states of a table; write a recording, tables, or both."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from mjwrap.text import counted
 def recompute(
     file: str, settings: StatesSettings, *, recording: str | None = None, json: str | None = None
 ) -> None:
-    """Evaluate the muscles at every state of a table; Ctrl-C keeps what is done.
+    """Evaluate the muscles at every state of a table; Ctrl-C keeps the states computed so far.
 
-    recording: a place for the recording where the settings have none. json: as `Report` takes it.
+    recording: the file of the recording if the settings name none. json: as `Report` takes it.
     """
     model = load(settings.model)
     data = start_state(model, start_keyframe(model, settings.keyframe))
@@ -42,7 +42,7 @@ def recompute(
         with uninterrupted():
             logs, close = open_outputs(settings, model, muscles, recording, stack)
         states.put(muscles, data, 0)
-        muscles.forward(data)  # compiles where that is still to do
+        muscles.forward(data)  # compiles the kernels if necessary
         bar = progress_bar(len(states.time), "states", "computing paths")
         done = 0
         with Interrupt() as interrupt, contextlib.closing(bar):
@@ -58,7 +58,7 @@ def recompute(
             stack.close()
     span = f"{states.time[0]:g} s to {states.time[done - 1]:g} s"
     without = {
-        name: f"no path at {counted(count, 'state')}; at last {muscles.reason(i)}"
+        name: f"no path at {counted(count, 'state')}; last reason: {muscles.reason(i)}"
         for i, (name, count) in enumerate(zip(muscles.names, failures.tolist(), strict=True))
         if count
     }
@@ -82,7 +82,7 @@ def open_outputs(
     settings: StatesSettings, model: mujoco.MjModel, muscles: MuscleSystem, recording: str | None,
     stack: contextlib.ExitStack,
 ) -> tuple[list[Log], Callable[[], None]]:  # fmt: skip
-    """Open what was asked for; return what to call at each state, and what at the end."""
+    """Open the outputs; return the functions to call at each state, and those to call at the end."""
     tables: list[RunTableFile | MuscleAnalysisTables] = []
     if settings.table:
         output = open_output(settings.table, "--out", *SUFFIXES)

@@ -1,11 +1,11 @@
-"""Simulate any model with its muscles along geodesic paths.
+"""Simulate a model with its muscles along geodesic paths.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME, a model that the myo-sim package composes.
+MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
 
-Excitation is a pattern for all muscles, NAME=PATTERN for those whose names match (* and ? stand for anything; any
-actuator may be named), or a table (.csv, .sto, .mot, .npz) with a column 'time' and one for each muscle or actuator
-that it drives. Several may be given; a later one wins. Patterns (times in s, amplitudes in the actuator's units, phase
-in turns):
+Excitation is PATTERN for all muscles, NAME=PATTERN for the muscles and actuators whose names match (* and ? match any
+characters), or a table (.csv, .sto, .mot, .npz) with a column 'time' and a column for each muscle or actuator that it
+drives. Several entries may be given; a later one overrides earlier ones. Patterns (times in s, amplitudes in the
+actuator's units, phases in turns):
   constant:LEVEL                          step:LEVEL@TIME
   sine:AMPLITUDE,HZ[,OFFSET[,PHASE]]      cosine:AMPLITUDE,HZ[,OFFSET[,PHASE]]
   pulses[:PEAK[,PERIOD]]                  random[:SEED[,HOLD]]
@@ -38,7 +38,7 @@ from mjwrap.cli.common.arguments import (
     recording_settings,
 )
 from mjwrap.cli.common.errors import UserError
-from mjwrap.cli.run.outputs import FilmSettings, OutputSettings
+from mjwrap.cli.run.run_files import FilmSettings, OutputSettings
 from mjwrap.cli.run.running import RunCommandSettings, run
 from mjwrap.files import SUFFIXES
 from mjwrap.runs.engine import MODES
@@ -50,74 +50,84 @@ COLUMNS = ",".join(DEFAULT_KINDS)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Say which arguments there are."""
-    add_model(parser, "start there", "for the pattern 'random'")
+    """Add the arguments of the command."""
+    add_model(parser, "keyframe at which the simulation starts", "seed of the pattern 'random'")
     several = {"nargs": "+", "action": "extend", "default": []}
     add = parser.add_argument
     add("--duration", type=positive, default=1.0, metavar="S", help="simulated time (default %(default)s s)")
-    add("--timestep", type=positive, metavar="S", help="instead of the model's")
-    add("--integrator", choices=INTEGRATORS, type=str.lower, help="instead of the model's")
-    add("--mode", metavar="MODE", help="what runs the muscles: python, in steps (default); or the engine plugin, as "
-        "mjwrap.install knows it: wrench (default with --video), transmission")  # fmt: skip
-    add("--excitation", **several, metavar="PATTERN|NAME=PATTERN|FILE", help="see above")
+    add("--timestep", type=positive, metavar="S", help="time step (default: the model's)")
+    add("--integrator", choices=INTEGRATORS, type=str.lower, help="integrator (default: the model's)")
+    add("--mode", metavar="MODE", help="python: steps a MuscleSystem (default); wrench or "
+        "transmission: runs the engine plugin in this mode (default with --video: wrench)")  # fmt: skip
+    add(
+        "--excitation",
+        **several,
+        metavar="PATTERN|NAME=PATTERN|FILE",
+        help="excitation of muscles and other actuators: see above",
+    )
     add("--prescribe", **several, metavar="JOINT=PATTERN|FILE", help="joints that follow a constant, sine or cosine "
-        "[rad, m] or the columns of a table, whatever pulls at them")  # fmt: skip
-    add("--qpos", **several, metavar="JOINT=VALUE", help="start positions [rad, m]")
-    add("--strict", action="store_true", help="stop where a muscle's path cannot be found")
-    add("--sample", type=positive, default=0.005, metavar="S", help="time between samples, rounded to whole time "
-        "steps (default %(default)s s)")  # fmt: skip
+        "[rad, m] or the columns of a table, whatever forces act on them")  # fmt: skip
+    add("--qpos", **several, metavar="JOINT=VALUE", help="positions of joints at the start [rad, m]")
+    add("--strict", action="store_true", help="stop the run when the path of a muscle cannot be found")
+    add("--sample", type=positive, default=0.005, metavar="S", help="time between samples of the outputs, "
+        "rounded to whole time steps (default %(default)s s)")  # fmt: skip
     recording = parser.add_argument_group("recording")
     places = recording.add_mutually_exclusive_group()
     add_recording(recording, places)
-    add_serving(recording, places, "show the run")
+    add_serving(recording, places, "serve the run")
     film = parser.add_argument_group("film").add_argument
-    film("--video", metavar="FILE.mp4", help="film, drawn offscreen by MuJoCo (mp4, gif)")
-    film("--video-size", type=pixels, default=(640, 480), metavar="WxH", help="of the film (default 640x480)")
-    film("--fps", type=positive, default=30.0, metavar="N", help="frames a second of the film (default 30)")
+    film("--video", metavar="FILE.mp4", help="write a film of the run, drawn by MuJoCo (.mp4, .gif)")
+    film(
+        "--video-size",
+        type=pixels,
+        default=(640, 480),
+        metavar="WxH",
+        help="pixels of the film (default 640x480)",
+    )
+    film("--fps", type=positive, default=30.0, metavar="N", help="frames per second of the film (default 30)")
     film(
         "--speed",
         type=positive,
         default=1.0,
         metavar="X",
-        help="simulated seconds a second of it (default 1)",
+        help="playback speed of the film: simulated seconds per second of film (default 1)",
     )
     film(
         "--camera",
         metavar="NAME",
-        help="a camera of the model, for the film, or 'muscles', one that looks at them (default: all of the model)",
+        help="camera of the film: a camera of the model, or 'muscles', which looks at the muscles (default: a view of "
+        "the whole model)",
     )
     files = parser.add_argument_group("plot and tables").add_argument
     files(
         "--plot",
         metavar="FILE.png",
-        help="joints, activations, lengths and tensions over time (png, pdf, svg)",
+        help="plot joints, activations, lengths and tensions over time (.png, .pdf, .svg)",
     )
-    files("--out", metavar="FILE", help=f"table over time, SI units ({', '.join(SUFFIXES)})")
-    files("--csv", metavar="FILE.csv", help="another table, or the only one, as CSV")
-    files("--columns", default=COLUMNS, metavar="KINDS", help="what the tables hold, of "
-        f"{', '.join(KINDS)} (default {COLUMNS})")  # fmt: skip
+    files("--out", metavar="FILE", help=f"write a table over time in SI units ({', '.join(SUFFIXES)})")
+    files("--csv", metavar="FILE.csv", help="write the table as CSV, with or without --out")
+    files("--columns", default=COLUMNS, metavar="KINDS", help="quantities in the tables, separated by "
+        f"commas: {', '.join(KINDS)} (default {COLUMNS})")  # fmt: skip
     add_analysis(files)
-    add_json(parser, "what was run, how fast, and what went wrong")
+    add_json(parser, "write the settings, the speed and the problems of the run")
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run, and return the exit code."""
+    """Run the command and return its exit code."""
     return run(settings(options))
 
 
 def settings(options: argparse.Namespace) -> RunCommandSettings:
-    """Return what the arguments ask for; `UserError` where they do not fit together."""
+    """Convert the arguments to settings; raises `UserError` if they contradict each other."""
     mode = options.mode or ("wrench" if options.video else MODES[0])
     if options.video and mode == MODES[0]:
-        raise UserError(
-            "--video shows the muscles of the engine plugin: leave --mode out, or let it be wrench"
-        )
+        raise UserError("--video needs the engine plugin: leave --mode out, or write --mode wrench")
     if mode not in MODES:
         raise UserError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
     if options.camera and not options.video:
-        raise UserError("--camera is for a film: it goes with --video")
+        raise UserError("--camera needs a film: add --video")
     if options.columns != COLUMNS and not (options.out or options.csv):
-        raise UserError("--columns says what a table holds: it goes with --out or --csv")
+        raise UserError("--columns needs a table: add --out or --csv")
     places = (options.record, options.connect, options.serve)
     outputs = OutputSettings(
         recording=recording_settings(options, any(places), "--record, --connect or --serve"),

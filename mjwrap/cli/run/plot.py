@@ -1,4 +1,4 @@
-"""The picture of a run: joints, activations, lengths and tensions over time; few muscles as lines, many as maps."""
+"""Plot a run: joints, activations, lengths and tensions over time; few muscles as lines, many as maps."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from mjwrap.runs.plot_history import PlotHistory
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
-LINES = 12  # more curves than this in one panel cannot be told apart
+LINES = 12  # more curves than this in one panel cannot be distinguished
 _STYLES = ("-", "--", ":")
 
 
 def plot_run(
     output: PartFile, title: str, model: mujoco.MjModel, muscles: MuscleSystem, history: PlotHistory
 ) -> None:
-    """Draw a run and give the file its name."""
+    """Plot a run and write the file."""
     many = muscles.n > LINES
     turns, slides, left_out = _joints(model, history.column(1))
     panels = [p for p in ("turns" if turns else "", "slides" if slides else "") if p]
@@ -44,7 +44,7 @@ def plot_run(
             _lines(axis, time, {name: 1e3 * x for name, x in slides.items()}, "joints [mm]", many)
         else:
             _muscle_panel(figure, axis, time, panel, muscles, history, many)
-    notes = [f"left out: {counted(left_out, 'joint')} that move less"] if left_out else []
+    notes = [f"left out: {counted(left_out, 'joint')} with less motion"] if left_out else []
     if muscles.failures.any():
         failed = [name for name, count in zip(muscles.names, muscles.failures, strict=True) if count]
         notes.append(f"paths not found at some steps: {'in red' if many else ', '.join(failed)}")
@@ -56,7 +56,7 @@ def plot_run(
 
 
 def _joints(model: mujoco.MjModel, qpos: Array) -> tuple[dict[str, Array], dict[str, Array], int]:
-    """Return the positions of hinges and of slides that move most, and how many are left out."""
+    """Return the positions of the hinges and slides that move most, and the number of joints left out."""
     turns: dict[str, Array] = {}
     slides: dict[str, Array] = {}
     for j in range(model.njnt):
@@ -73,7 +73,7 @@ def _joints(model: mujoco.MjModel, qpos: Array) -> tuple[dict[str, Array], dict[
 
 
 def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str, wide: bool = False) -> None:
-    """Draw named curves, with a legend at the right or, over `wide` panels, on top."""
+    """Draw named curves, with the legend at the right or, for `wide` panels, above."""
     colours = plt.get_cmap("tab10").colors  # pyright: ignore[reportAttributeAccessIssue]
     for k, (name, curve) in enumerate(curves.items()):
         axis.plot(
@@ -99,13 +99,13 @@ def _muscle_panel(
         if panel == "activation":
             axis.set_ylim(-0.03, max(1.03, float(values.max()) * 1.03))
         return
-    if panel == "length":  # each muscle against its own first length: they differ tenfold
+    if panel == "length":  # each muscle relative to its own first length, because lengths differ tenfold
         values, label = values - values[0], "length, change since the start [mm]"
     top = float(np.abs(values).max()) or 1.0
     norm = {
         "activation": Normalize(0.0, 1.0),
         "length": Normalize(-top, top),
-        "tension": PowerNorm(0.5, 0.0, top),  # so that small muscles are seen beside large ones
+        "tension": PowerNorm(0.5, 0.0, top),  # so that small muscles are visible beside large ones
     }[panel]
     colours = "RdBu_r" if panel == "length" else "viridis"
     edges = np.append(time, time[-1] + (time[-1] - time[-2] if len(time) > 1 else 1e-3))

@@ -1,4 +1,4 @@
-"""Run a model: open its outputs, follow the run on the terminal, and report."""
+"""Run a model: open the outputs, show the progress, and report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mjwrap.cli.common.output import Report, opened
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
-from mjwrap.cli.run.outputs import OutputSettings, open_outputs
+from mjwrap.cli.run.run_files import OutputSettings, open_outputs
 from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
 from mjwrap.runs.engine import MODES
@@ -26,8 +26,8 @@ from mjwrap.text import counted
 class RunCommandSettings:
     """The settings of `mjwrap run`.
 
-    model: a file, or "myo_sim:NAME". serve_port: where to serve the run to a browser, None: nowhere. json: the file
-    that the report goes to as values, "-" for standard output, or None.
+    model: a file, or "myo_sim:NAME". serve_port: port on which the run is served to a browser, or None. json: a file
+    for the report as values, "-" for standard output, or None.
     """
 
     model: str
@@ -38,7 +38,7 @@ class RunCommandSettings:
 
 
 def run(settings: RunCommandSettings) -> int:
-    """Set up, run, and say what happened and where the files are."""
+    """Run a model, report, and return the exit code."""
     simulation = Simulation(settings.model, settings.run, option="--prescribe")
     report = Report(settings.json)
     with contextlib.ExitStack() as stack:
@@ -62,16 +62,18 @@ def run(settings: RunCommandSettings) -> int:
         report.finish(facts(settings, simulation, spent, interrupt.asked))
         if interrupt.asked:
             name = interrupt.asked.name
-            print(f"mjwrap run: stopped by {name}; the files hold what was simulated", file=sys.stderr)
+            print(
+                f"mjwrap run: stopped by {name}; the files contain the run up to this moment", file=sys.stderr
+            )
             return interrupt.asked.code
         if server:
-            told = "mjwrap run: done, and still served; Ctrl-C stops serving"
+            told = "mjwrap run: the run is complete and still served; press Ctrl-C to stop"
             return serve_until_stopped(server, lambda: print(told, file=sys.stderr))
         return 0
 
 
 def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None:
-    """Start what --serve asks for and say where it is, so that a browser can follow the run."""
+    """Start the server of --serve and print its address, so that a browser can follow the run."""
     if port is None:
         return None
     with uninterrupted():
@@ -82,14 +84,14 @@ def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None
 
 
 def advance(simulation: Simulation, logs: list[Log], interrupt: Interrupt) -> WallTime:
-    """Run with a progress bar, until the end or a signal."""
+    """Run with a progress bar until the end or a signal."""
     bar = progress_bar(simulation.duration, "s", "simulating")
     with contextlib.closing(bar):
         return simulation.advance(logs, progress=bar.update, stopped=lambda: interrupt.asked)
 
 
 def tell(report: Report, settings: RunCommandSettings, simulation: Simulation, spent: WallTime) -> None:
-    """Say what was run, how fast, what went wrong, and where the files are."""
+    """Print the settings, the speed and the problems of the run, and its files."""
     engine, muscles = simulation.engine, simulation.muscles
     simulated = engine.data.time
     mode = "" if settings.run.mode == MODES[0] else f", plugin mode {settings.run.mode}"
@@ -99,7 +101,7 @@ def tell(report: Report, settings: RunCommandSettings, simulation: Simulation, s
     rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
     if not muscles.n and not muscles.native:
-        report.say("the model declares no muscle that mjwrap could drive; only MuJoCo moved it")
+        report.say("the model declares no muscle for mjwrap; MuJoCo alone simulated it")
     if muscles.native:
         report.say(f"{counted(len(muscles.native), 'actuator')} left to MuJoCo:")
         for name, reason in muscles.native.items():
@@ -116,7 +118,7 @@ def tell(report: Report, settings: RunCommandSettings, simulation: Simulation, s
 def facts(
     settings: RunCommandSettings, simulation: Simulation, spent: WallTime, stopped: Stopped | None
 ) -> dict[str, object]:
-    """Return the same as values."""
+    """Return the report as values."""
     engine = simulation.engine
     return {
         "model": settings.model,

@@ -1,1 +1,1 @@
-"""Makes the block of memory of each instance: its first contents, its allocation, and what it follows of the model."""
+"""The block of memory of each instance: its first contents, its allocation, and updates when the model changes."""

@@ -1,6 +1,7 @@
-"""Gives every new mjData its block, and renews the block when the model has changed.
+"""Allocate the block of every new mjData, and rewrite it when the model has changed.
 
-The first contents of a block are made from a copy of the model, which takes a while; those of the last models are kept.
+The first contents of a block are computed from a copy of the model, which takes time, so those of recent models are
+kept.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections import OrderedDict
 
 from mjwrap.errors import ModelError
 from mjwrap.plugin.blocks.image import block_image, renew, state_size
-from mjwrap.plugin.blocks.reading import copy_read
+from mjwrap.plugin.blocks.instance_muscles import copy_read
 from mjwrap.plugin.blocks.table import enter_block
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks.hooks import Entries, compile_entries
@@ -34,7 +35,7 @@ def entries() -> Entries:
 
 
 def give_block(model: int, data: int, instance: int) -> int:
-    """Make a block for an instance of the model and the mjData at these addresses; return its place in the table."""
+    """Make a block for an instance, given the addresses of model and mjData; return its place in the table."""
     image = _image(model, instance)
     block = raw_malloc(len(image))
     ctypes.memmove(block, image, len(image))
@@ -43,12 +44,12 @@ def give_block(model: int, data: int, instance: int) -> int:
 
 
 def raw_malloc(size: int) -> int:
-    """Return the address of new memory [bytes], which may be freed without the GIL, and when Python has ended."""
+    """Return the address of new memory [bytes]; it may be freed without the GIL, even after Python has ended."""
     allocate = ctypes.pythonapi.PyMem_RawMalloc
     allocate.restype, allocate.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
     address = allocate(size)
     if not address:
-        raise MemoryError(f"no {size} bytes for the muscles' memory")
+        raise MemoryError(f"cannot allocate {size} bytes for the muscles")
     return int(address)
 
 
@@ -68,7 +69,7 @@ def _image(address: int, instance: int) -> bytes:
     with copy_read(address, configuration) as (model, plan, muscles):
         if state_size(plan) != configuration.numbers:
             raise ModelError(
-                f"the paths of the engine plugin's muscles have changed since mjwrap.install: their state needs "
+                f"the muscles' paths have changed since mjwrap.install: their state needs "
                 f"{state_size(plan)} numbers and has {configuration.numbers}; call install again"
             )
         image = block_image(model, instance, plan, muscles, entries(), free_function(), _rebuild_function())
@@ -82,13 +83,13 @@ def _image(address: int, instance: int) -> bytes:
 
 
 def _rebuild(block: int, model: int, instance: int) -> None:
-    """Make a block's numbers those of a changed model, or leave them as they are and say why."""
+    """Update a block to a changed model; if that is impossible, leave it unchanged and warn."""
     try:
         if not renew(block, _image(model, instance)):
-            raise ModelError("its muscles are not those that the mjData was made for; make a new mjData")
+            raise ModelError("its muscles differ from those for which the mjData was made; make a new mjData")
     except Exception as error:
         print(
-            f"mjwrap: changes in the model are not followed, its muscles stay as they were: {error}",
+            f"mjwrap: a change of the model is ignored, its muscles stay as they were: {error}",
             file=sys.stderr, flush=True,
         )  # fmt: skip
 

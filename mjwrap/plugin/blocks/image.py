@@ -1,4 +1,4 @@
-"""Writes the first contents of a block from the compiled model that it belongs to."""
+"""Write the first contents of a block from its compiled model."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
+from mjwrap.plugin.blocks.model_changes import Watch, watch
 from mjwrap.plugin.blocks.transmission_part import transmission_part
-from mjwrap.plugin.blocks.watch import Watch, watch
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing as dr
 from mjwrap.plugin.callbacks import saving
@@ -30,7 +30,7 @@ Words = NDArray[np.int64]
 
 
 def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
-    """Return the ids of the bodies on which the muscles of a plan can act by wrenches."""
+    """Return the ids of the bodies on which the muscles of a plan can act with wrenches."""
     routes = plan.routes[plan.output[plan.routes[:, muscle_paths.R_MUSCLE]] < 0]
     stops = [
         plan.links[low:high, muscle_paths.L_BODY]
@@ -41,7 +41,7 @@ def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
 
 
 def state_size(plan: Plan) -> int:
-    """Return how many numbers of plugin_state the muscles of a plan need; `saving.py` says what they are."""
+    """Return the number of entries of plugin_state that the muscles of a plan need; see `saving.py`."""
     numbers = 1 + saving.PER_MUSCLE * plan.n + 13 * len(loaded_bodies(plan))
     for low, high, surfaces in plan.routes[
         :, [muscle_paths.R_LO, muscle_paths.R_HI, muscle_paths.R_SURFACES]
@@ -61,7 +61,7 @@ def _arrays(
     arrays: dict[str, Any] = {name: getattr(plan, name) for name in bk.ARRAYS if hasattr(plan, name)}
     params = np.array(plan.params)
     for m, (muscle, law) in enumerate(zip(muscles, plan.law, strict=True)):
-        if muscle.actuator >= 0 and law == MUJOCO:  # its limits as the marks that `follow.py` compares
+        if muscle.actuator >= 0 and law == MUJOCO:  # its limits are marks that `sync.py` compares
             limits = limit_marks(model, muscle.actuator)
             params[m, mujoco_muscle.LIMITS : mujoco_muscle.LIMITS + 2] = limits
     arrays |= {
@@ -130,7 +130,7 @@ def block_image(
     return head.tobytes() + b"".join(pieces)
 
 
-# what a block holds of the model; the states in its rows of nodes are read from plugin_state afterwards
+# arrays that depend on the model; the states in the rows of nodes are read from plugin_state afterwards
 _CONSTANT = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
     "weights", "params", "ctrl_low", "ctrl_high", "times", "node", "bound", "drives", "transmission",
@@ -139,7 +139,7 @@ _CONSTANT = (
 
 
 def renew(block: int, image: bytes) -> bool:
-    """Give a living block the numbers of a new image, and keep its state; return whether both have one layout."""
+    """Copy a new image into a block in use, keeping its state; return False, and copy nothing, if layouts differ."""
     head = np.frombuffer(image, dtype=np.int64, count=bk.HEAD)
     living = np.ctypeslib.as_array((ctypes.c_int64 * bk.HEAD).from_address(block))
     same = head == living

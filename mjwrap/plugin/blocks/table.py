@@ -1,4 +1,4 @@
-"""Enters blocks into the table of `callbacks/block_table.py` and finds them there, from Python."""
+"""Enter blocks into the table of `callbacks/block_table.py`, and find them there, from Python."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def _entries(count: int) -> NDArray[np.int64]:
 
 
 def enter_block(data: int, instance: int, block: int) -> int:
-    """Enter the block of an instance of the mjData at an address; return its place, from 1 on.
+    """Enter the block of an instance of the mjData at an address; return its index in the table, from 1 on.
 
-    `MemoryError` where the table is full.
+    Raises `MemoryError` if the table is full.
     """
     with _LOCK:
         used = bt.TABLE[0]
@@ -35,7 +35,7 @@ def enter_block(data: int, instance: int, block: int) -> int:
 
 
 def find_block(data: int, instance: int) -> int:
-    """Return the address of the block of an instance of the mjData at an address, 0 where it has none."""
+    """Return the address of the block of an instance of the mjData at an address, 0 if it has none."""
     entries = _entries(bt.TABLE[0])
     own = (entries[:, bt.OWNER] == data) & (entries[:, bt.INSTANCE] == instance)
     return int(entries[own, bt.BLOCK][0]) if own.any() else 0

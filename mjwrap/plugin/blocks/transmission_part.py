@@ -1,4 +1,4 @@
-"""Writes the part of a block with which actuators get length, velocity and moment along mjwrap's paths."""
+"""Write the part of a block that gives actuators length, velocity and moment along mjwrap's paths."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ OBJ = mujoco.mjtObj
 
 
 def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
-    """Return the dofs for which MuJoCo keeps room in the moment of an actuator: those that its tendon's bodies have."""
+    """Return the dofs for which MuJoCo stores the moment of an actuator: those that move its tendon's bodies."""
     tendon = int(model.actuator_trnid[actuator, 0])
     first = int(model.ten_J_rowadr[tendon])
     return {int(dof) for dof in model.ten_J_colind[first : first + int(model.ten_J_rownnz[tendon])]}
 
 
 def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> None:
-    """Raise `ModelError` for a muscle whose path changes with a dof for which its actuator's moment has no room."""
+    """Raise `ModelError` if the path of a muscle depends on a dof for which MuJoCo stores no moment of its actuator."""
     moves = moving_dofs(model)
     for route in plan.routes:
         muscle = muscles[int(route[muscle_paths.R_MUSCLE])]
@@ -38,19 +38,19 @@ def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: list[Muscle
         stops = plan.links[route[muscle_paths.R_LO] : route[muscle_paths.R_HI], muscle_paths.L_BODY].tolist()
         bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
         moved = {body: set(np.flatnonzero(moves[body]).tolist()) for body in bodies}
-        room = _columns(model, muscle.actuator) | set.intersection(*moved.values())
+        stored = _columns(model, muscle.actuator) | set.intersection(*moved.values())
         for body, dofs in moved.items():
-            if not dofs <= room:
+            if not dofs <= stored:
                 tendon = name_of(model, OBJ.mjOBJ_TENDON, int(model.actuator_trnid[muscle.actuator, 0]))
                 raise ModelError(
                     f"muscle '{muscle.name}': its path runs over body '{name_of(model, OBJ.mjOBJ_BODY, body)}', which "
-                    f"tendon '{tendon}' does not touch, so MuJoCo keeps no room for its moment there; let the tendon "
+                    f"tendon '{tendon}' does not touch, so MuJoCo does not store its moment there; let the tendon "
                     f"pass a site on that body, or use mode 'wrench'"
                 )
 
 
 def _sensors(model: mujoco.MjModel, plan: Plan, tendons: Ints) -> list[tuple[int, int, int, float]]:
-    """Return index in sensordata, muscle, whether it is an actuator's, and cutoff [m] of the sensors of lengths."""
+    """Return the sensors of lengths: index in sensordata, muscle, whether of an actuator, and cutoff [m]."""
     kinds = mujoco.mjtSensor
     by_output = {int(out): m for m, out in enumerate(plan.output) if out >= 0}
     by_tendon = {int(tendon): m for m, tendon in enumerate(tendons) if tendon >= 0}
@@ -74,7 +74,7 @@ def _sensors(model: mujoco.MjModel, plan: Plan, tendons: Ints) -> list[tuple[int
 
 
 def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> Ints:
-    """Return the part of the block that `callbacks/transmission.py` reads, as words."""
+    """Return the part of the block that `callbacks/transmission.py` reads, as 64-bit integers."""
     head = np.zeros(tr.HEAD, dtype=np.int64)
     head[tr.COUNT] = np.count_nonzero(plan.output >= 0)
     if not head[tr.COUNT]:

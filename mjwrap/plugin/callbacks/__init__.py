@@ -1,1 +1,1 @@
-"""Compiled callbacks, which MuJoCo calls: numba functions on raw addresses, in which no Python runs."""
+"""The compiled callbacks that MuJoCo calls: numba functions on raw addresses, without Python."""

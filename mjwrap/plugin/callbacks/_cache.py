@@ -1,4 +1,4 @@
-"""How the callbacks are compiled; their machine code is kept as the kernels' is."""
+"""Compile the callbacks; their machine code is cached like that of the kernels."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def jit(function: F) -> F:
 
 
 def callback(signature: Any, function: Callable[..., Any]) -> Any:
-    """Compile a function with a C signature now; its `address` is what MuJoCo calls."""
+    """Compile a function with a C signature now; MuJoCo calls it by its `address`."""
     with kept(function):
         return numba.cfunc(signature, **_OPTIONS)(function)

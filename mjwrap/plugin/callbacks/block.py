@@ -1,8 +1,8 @@
-"""The layout of a block: the memory that one instance of the plugin has for one mjData, in one piece.
+"""The layout of a block, which is the memory of one instance of the plugin for one mjData.
 
-It holds a copy of the muscles' arrays (`mjwrap/model/arrays.py`), scratch memory of the kernels and what was added to
-xfrc_applied, so that nothing is shared between threads and nothing outlives its mjData. Its head is an array of words:
-sizes, offsets of MuJoCo's fields, addresses of functions, and where in the block (in bytes) each array starts.
+A block has a copy of the muscles' arrays (`mjwrap/model/arrays.py`), the kernels' scratch memory, and the forces that
+were added to xfrc_applied. So threads share no memory, and all of it is freed with the mjData. Its head is an array of
+64-bit integers: sizes, offsets of MuJoCo's fields, addresses of functions, and the byte at which each array starts.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ MUSCLES, NODES, ROUTES, BODIES, SITES, GEOMS, ACTS, CTRLS = 1, 2, 3, 4, 5, 6, 7,
 LOADED, NSTATE = 9, 10  # bodies that muscles pull, numbers in plugin_state
 STATE_ADDRESS = 11  # index of the instance's first number in plugin_state
 # functions
-DRAW = 12  # 0 where nothing can be drawn
-STAGE, FINISH, FREE = 13, 14, 15  # FREE: gives the block back to the system
+DRAW = 12  # 0 if drawing is not possible
+STAGE, FINISH, FREE = 13, 14, 15  # FREE: frees the block
 # byte offsets of mjData's and mjModel's fields, in this order
 FIELDS = (
     "time", "act", "ctrl", "plugin_state", "xfrc_applied", "site_xpos", "geom_xpos", "geom_xmat", "cvel",
@@ -26,10 +26,10 @@ FIELDS = (
 ) = range(16, 16 + len(FIELDS))  # fmt: skip
 # MuJoCo's codes: the integrator RK4, the bit of `disableflags` that switches actuation off
 RUNGE_KUTTA, NO_ACTUATION = 32, 33
-# what `follow.py` needs: the model last followed, its instance, the function that builds the numbers anew, and how many
-# regions it watches
+# for `sync.py`: the model at the last update, its instance, the function that rewrites the block, and the number of
+# regions of each kind
 MODEL, INSTANCE, REBUILD, PLAIN, DERIVED, STRUCTURE, BOUND = 34, 35, 36, 37, 38, 39, 40
-# where the arrays start
+# offsets of the arrays
 ARRAYS = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
     "weights", "params", "ctrl_low", "ctrl_high", "times",
@@ -48,8 +48,8 @@ ARRAYS = (
     A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
     A_PLAIN, A_PLAIN_SEEN, A_DERIVED, A_DERIVED_SEEN, A_STRUCTURE, A_STRUCTURE_SEEN, A_BOUND, A_DRIVES, A_POINTERS,
 ) = range(48, 48 + len(ARRAYS))  # fmt: skip
-# how to draw: byte offsets in MuJoCo's structs (of an option: of its byte), the size of a mjvGeom, MuJoCo's codes, the
-# address of a function that warns and of what it says
+# for drawing: byte offsets in MuJoCo's structs (for an option: of its byte), the size of an mjvGeom, MuJoCo's codes,
+# the addresses of a function that warns and of its message
 DRAWING = (
     "scene.maxgeom", "scene.ngeom", "scene.geoms", "scene.status",
     "option.label", "option.tendon", "option.actuator", "option.activation", "option.transparent",
@@ -84,7 +84,7 @@ HEAD = _FIRST + len(DRAWING)
 
 SILENT = -2  # in `group`: the muscle's own tension is zero, since its actuator pulls
 
-# entries of `clock`: time of the first evaluation since the last step where the state's own clock says nothing;
+# entries of `clock`: time of the first evaluation since the last step, used while the state has no time of its own;
 # whether there was an evaluation since the last step
 FIRST, ACTED = 0, 1
 CLOCK = 2

@@ -1,10 +1,11 @@
-"""Draws muscles as geoms of an mjvScene, which MuJoCo's viewers and its renderer show beside the model.
+"""Draw muscles as geoms of an mjvScene, which MuJoCo's viewers and its renderer show with the model.
 
-A path is drawn as MuJoCo draws a tendon: capsules of the tendon's width, colour, material and group, or those of a new
-tendon where the muscle has none; the default grey gives way to the colour of the muscle's activation. Where actuators
-are shown, the path is drawn once more, wider and in the colour of control or activation. Contact points are spheres.
+A path is drawn as MuJoCo draws a tendon: as capsules with the tendon's width, colour, material and group, or with those
+of a new tendon if the muscle has none. The default grey is replaced by the colour of the muscle's activation. If
+actuators are shown, the path is drawn a second time, wider and in the colour of control or activation. Contact points
+are spheres.
 
-The block is only read: geodesics are evaluated from point to point in a copy of its nodes.
+The block is not changed: geodesics are evaluated from point to point in a copy of its nodes.
 """
 
 from __future__ import annotations
@@ -21,22 +22,22 @@ from mjwrap.mjcf.marks import HIDDEN_BELOW, HIDDEN_FACTOR
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import (
-    byte,
     call,
-    half,
-    halves,
-    octets,
-    real,
-    single,
-    singles,
-    word,
+    float32_array,
+    int32_array,
+    read_float32,
+    read_float64,
+    read_int32,
+    read_int64,
+    read_uint8,
+    uint8_array,
 )
 from mjwrap.plugin.callbacks.saving import floats, ints, sizes
 from mjwrap.plugin.callbacks.stage import GROUPS as SWITCHES
 
 WIDTH = 0.003  # of a muscle without a tendon [m]: MuJoCo's default
 BEAD = 1.5  # radius of a contact point [widths]
-ROOM = 4096  # points of a path for which there is room at first
+ROOM = 4096  # points of a path for which memory is allocated at first
 GROUPS = 6  # mjNGROUP
 TINY = 1e-15  # mjMINVAL
 LABEL = 100  # bytes of a label
@@ -45,24 +46,24 @@ LOOK = 8  # colour (4), emission, specular, shininess, reflectance: as they foll
 
 @jit
 def _at(block, place):
-    return word(block + 8 * place)
+    return read_int64(block + 8 * place)
 
 
 @jit
 def _shows(block, option, groups, group):
-    """Return whether an option shows the elements of a group, which it clips as MuJoCo does."""
-    return byte(option + _at(block, groups) + min(max(group, 0), GROUPS - 1)) != 0
+    """Return whether an option shows the elements of a group; the group is clipped as in MuJoCo."""
+    return read_uint8(option + _at(block, groups) + min(max(group, 0), GROUPS - 1)) != 0
 
 
 @jit
 def width_of(width):
-    """Return the width of a tendon as it was written."""
+    """Return the width of a tendon as written in the model, before `hide_tendons`."""
     return width / HIDDEN_FACTOR if width < HIDDEN_BELOW else width
 
 
 @jit
 def _mix(block, model, value, low, high, look):
-    """Write the colour of an actuator at a control, or activation, within its limits, as MuJoCo mixes it."""
+    """Write the colour of an actuator for a control or activation between its limits, by MuJoCo's rule."""
     if low == -math.inf:
         low, high = -1.0, 1.0
     least, middle, most = low, 0.0, high
@@ -77,61 +78,63 @@ def _mix(block, model, value, low, high, look):
     share = min(max(share, 0.0), 1.0)
     end = _at(block, bk.D_POSITIVE_RGBA if above else bk.D_NEGATIVE_RGBA)
     for i in range(4):
-        rest = single(model + _at(block, bk.D_ACTUATOR_RGBA) + 4 * i)
-        look[i] = rest + share * (single(model + end + 4 * i) - rest)
+        rest = read_float32(model + _at(block, bk.D_ACTUATOR_RGBA) + 4 * i)
+        look[i] = rest + share * (read_float32(model + end + 4 * i) - rest)
 
 
 @jit
 def _plain(block, look):
-    """Write how a geom without a material reflects light."""
+    """Write the reflection coefficients of a geom without a material."""
     blank = block + _at(block, bk.A_BLANK)
     for i in range(4):
-        look[4 + i] = single(blank + _at(block, bk.G_EMISSION + i))
+        look[4 + i] = read_float32(blank + _at(block, bk.G_EMISSION + i))
 
 
 @jit
 def _tendon_look(block, model, option, tendon, activation, low, high, look):
-    """Write colour and material of a tendon (-1: none), by the rules of MuJoCo, but for the default grey."""
+    """Write colour and material of a tendon (-1: none) by MuJoCo's rules, except for the default grey."""
     _plain(block, look)
     material, own = -1, False
     if tendon >= 0:
-        material = half(word(model + _at(block, bk.D_TENDON_MATID)) + 4 * tendon)
-        rgba = word(model + _at(block, bk.D_TENDON_RGBA)) + 16 * tendon
+        material = read_int32(read_int64(model + _at(block, bk.D_TENDON_MATID)) + 4 * tendon)
+        rgba = read_int64(model + _at(block, bk.D_TENDON_RGBA)) + 16 * tendon
         own = (
-            single(rgba) != 0.5
-            or single(rgba + 4) != 0.5
-            or single(rgba + 8) != 0.5
-            or single(rgba + 12) != 1.0
+            read_float32(rgba) != 0.5
+            or read_float32(rgba + 4) != 0.5
+            or read_float32(rgba + 8) != 0.5
+            or read_float32(rgba + 12) != 1.0
         )
         if material >= 0:
             for i in range(4):
-                look[i] = single(word(model + _at(block, bk.D_MAT_RGBA)) + 16 * material + 4 * i)
-                look[4 + i] = single(word(model + _at(block, bk.D_MAT_EMISSION + i)) + 4 * material)
+                look[i] = read_float32(read_int64(model + _at(block, bk.D_MAT_RGBA)) + 16 * material + 4 * i)
+                look[4 + i] = read_float32(
+                    read_int64(model + _at(block, bk.D_MAT_EMISSION + i)) + 4 * material
+                )
         if own:
             for i in range(4):
-                look[i] = single(rgba + 4 * i)
+                look[i] = read_float32(rgba + 4 * i)
     if material < 0 and not own:
         _mix(block, model, activation, low, high, look)
-    if byte(option + _at(block, bk.D_TRANSPARENT)) != 0:
-        look[3] *= single(model + _at(block, bk.D_ALPHA))
+    if read_uint8(option + _at(block, bk.D_TRANSPARENT)) != 0:
+        look[3] *= read_float32(model + _at(block, bk.D_ALPHA))
 
 
 @jit
 def _add(block, scene, kind, identity, category, look):
-    """Return the address of a new geom of the scene, all but its shape filled in; 0 where the scene is full.
+    """Return the address of a new geom of the scene with all but its shape filled in; 0 if the scene is full.
 
-    identity: type and id of the element that it belongs to, as segmented images show them.
+    identity: type and id of its element, as in segmented images.
     """
-    number = half(scene + _at(block, bk.D_NGEOM))
-    if number >= half(scene + _at(block, bk.D_MAXGEOM)):
-        status = halves(scene + _at(block, bk.D_STATUS), (1,))
+    number = read_int32(scene + _at(block, bk.D_NGEOM))
+    if number >= read_int32(scene + _at(block, bk.D_MAXGEOM)):
+        status = int32_array(scene + _at(block, bk.D_STATUS), (1,))
         if status[0] == 0:
             status[0] = 1
             call(_at(block, bk.D_WARN), _at(block, bk.D_FULL), 0, 0)
         return 0
     size = _at(block, bk.G_BYTES)
-    geom = word(scene + _at(block, bk.D_GEOMS)) + size * number
-    blank, new = halves(block + _at(block, bk.A_BLANK), (size // 4,)), halves(geom, (size // 4,))
+    geom = read_int64(scene + _at(block, bk.D_GEOMS)) + size * number
+    blank, new = int32_array(block + _at(block, bk.A_BLANK), (size // 4,)), int32_array(geom, (size // 4,))
     for i in range(size // 4):
         new[i] = blank[i]
     new[_at(block, bk.G_TYPE) // 4] = kind
@@ -139,19 +142,19 @@ def _add(block, scene, kind, identity, category, look):
     new[_at(block, bk.G_OBJID) // 4] = identity[1]
     new[_at(block, bk.G_CATEGORY) // 4] = category
     new[_at(block, bk.G_SEGID) // 4] = number
-    number_of = halves(scene + _at(block, bk.D_NGEOM), (1,))
+    number_of = int32_array(scene + _at(block, bk.D_NGEOM), (1,))
     number_of[0] = number + 1
-    colour = singles(geom + _at(block, bk.G_RGBA), (4,))
+    colour = float32_array(geom + _at(block, bk.G_RGBA), (4,))
     for i in range(4):
         colour[i] = look[i]
-        light = singles(geom + _at(block, bk.G_EMISSION + i), (1,))
+        light = float32_array(geom + _at(block, bk.G_EMISSION + i), (1,))
         light[0] = look[4 + i]
     return geom
 
 
 @jit
 def _stretch(block, geom, ax, ay, az, bx, by, bz, radius):
-    """Give a capsule its shape: between two points, turned from z as little as possible, as mjv_connector does."""
+    """Set the shape of a capsule between two points, turned from z by the shortest way, as by mjv_connector."""
     dx, dy, dz = bx - ax, by - ay, bz - az
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     x, y, z = dx / length, dy / length, dz / length
@@ -159,10 +162,13 @@ def _stretch(block, geom, ax, ay, az, bx, by, bz, radius):
     h = 0.0
     if across > 0.0:
         h = 1.0 / (1.0 + z) if z > 0.0 else (1.0 - z) / across
-    size, pos = singles(geom + _at(block, bk.G_SIZE), (3,)), singles(geom + _at(block, bk.G_POS), (3,))
+    size, pos = (
+        float32_array(geom + _at(block, bk.G_SIZE), (3,)),
+        float32_array(geom + _at(block, bk.G_POS), (3,)),
+    )
     size[0], size[1], size[2] = radius, radius, 0.5 * length
     pos[0], pos[1], pos[2] = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)
-    turn = singles(geom + _at(block, bk.G_MAT), (9,))
+    turn = float32_array(geom + _at(block, bk.G_MAT), (9,))
     turn[0], turn[1], turn[2] = 1.0 - h * x * x, -h * x * y, x
     turn[3], turn[4], turn[5] = -h * x * y, 1.0 - h * y * y, y
     turn[6], turn[7], turn[8] = -x, -y, z
@@ -183,7 +189,7 @@ def _line(block, scene, points, count, radius, identity, category, look, label):
             return
         _stretch(block, geom, ax, ay, az, bx, by, bz, radius)
         if label != 0:
-            text, given = octets(geom + _at(block, bk.G_LABEL), (LABEL,)), octets(label, (LABEL,))
+            text, given = uint8_array(geom + _at(block, bk.G_LABEL), (LABEL,)), uint8_array(label, (LABEL,))
             for j in range(LABEL):
                 text[j] = given[j]
             label = 0
@@ -196,15 +202,18 @@ def _beads(block, scene, points, count, radius, identity, look):
         geom = _add(block, scene, _at(block, bk.C_SPHERE), identity, _at(block, bk.C_DECOR), look)
         if geom == 0:
             return
-        size, pos = singles(geom + _at(block, bk.G_SIZE), (3,)), singles(geom + _at(block, bk.G_POS), (3,))
+        size, pos = (
+            float32_array(geom + _at(block, bk.G_SIZE), (3,)),
+            float32_array(geom + _at(block, bk.G_POS), (3,)),
+        )
         for j in range(3):
             size[j], pos[j] = radius, points[i, j]
 
 
 def draw(block, model, option, scene):
-    """Append the muscles of an instance, as they were evaluated last, to the scene that the options ask for."""
-    tendons = byte(option + _at(block, bk.D_TENDON)) != 0
-    actuators = byte(option + _at(block, bk.D_ACTUATOR)) != 0
+    """Append the muscles of an instance, as last evaluated, to a scene, according to its options."""
+    tendons = read_uint8(option + _at(block, bk.D_TENDON)) != 0
+    actuators = read_uint8(option + _at(block, bk.D_ACTUATOR)) != 0
     if not tendons and not actuators:
         return
     n, nodes, routes, _ = sizes(block)
@@ -215,9 +224,9 @@ def draw(block, model, option, scene):
     activation, drive = floats(block, bk.A_ACTIVATION, (n,)), floats(block, bk.A_DRIVE, (n,))
     tendon, actuator = ints(block, bk.A_TENDON, (n,)), ints(block, bk.A_ACTUATOR, (n,))
     low, high = floats(block, bk.A_CTRL_LOW, (n,)), floats(block, bk.A_CTRL_HIGH, (n,))
-    switched = half(model + _at(block, bk.DISABLEACTUATOR))
-    by_activation = byte(option + _at(block, bk.D_ACTIVATION)) != 0
-    wanted = half(option + _at(block, bk.D_LABEL))
+    switched = read_int32(model + _at(block, bk.DISABLEACTUATOR))
+    by_activation = read_uint8(option + _at(block, bk.D_ACTIVATION)) != 0
+    wanted = read_int32(option + _at(block, bk.D_LABEL))
     points, look = np.empty((ROOM, 3)), np.empty(LOOK)
     identity, acting = np.empty(2, dtype=np.int64), np.empty(2, dtype=np.int64)
     for c in range(routes):
@@ -226,12 +235,12 @@ def draw(block, model, option, scene):
         m = route[c, R_MUSCLE]
         t, width, ten_group = tendon[m], WIDTH, 0
         if t >= 0:
-            width = width_of(real(word(model + _at(block, bk.D_TENDON_WIDTH)) + 8 * t))
-            ten_group = half(word(model + _at(block, bk.D_TENDON_GROUP)) + 4 * t)
+            width = width_of(read_float64(read_int64(model + _at(block, bk.D_TENDON_WIDTH)) + 8 * t))
+            ten_group = read_int32(read_int64(model + _at(block, bk.D_TENDON_GROUP)) + 4 * t)
         seen = tendons and _shows(block, option, bk.D_TENDONGROUP, ten_group)
         acts = actuators and actuator[m] >= 0
         if acts:
-            group = half(word(model + _at(block, bk.D_GROUP)) + 4 * actuator[m])
+            group = read_int32(read_int64(model + _at(block, bk.D_GROUP)) + 4 * actuator[m])
             acts = _shows(block, option, bk.D_ACTUATORGROUP, group)
             acts = acts and not (0 <= group < SWITCHES and ((switched >> group) & 1) != 0)
         if not seen and not acts:
@@ -254,12 +263,12 @@ def draw(block, model, option, scene):
         if acts:
             acting[0], acting[1] = _at(block, bk.C_ACTUATOR), actuator[m]
             _mix(block, model, activation[m] if by_activation else drive[m], low[m], high[m], look)
-            wide = width * single(model + _at(block, bk.D_ACTUATOR_SCALE))
+            wide = width * read_float32(model + _at(block, bk.D_ACTUATOR_SCALE))
             named = label if wanted == _at(block, bk.C_LABEL_ACTUATOR) else 0
             _line(block, scene, points, many, wide, acting, _at(block, bk.C_DECOR), look, named)
         if seen:
             many = min(route_contacts(c, route, node, seg, count, points, 0), points.shape[0])
             _plain(block, look)
             for i in range(4):
-                look[i] = single(model + _at(block, bk.D_CONTACT_RGBA) + 4 * i)
+                look[i] = read_float32(model + _at(block, bk.D_CONTACT_RGBA) + 4 * i)
             _beads(block, scene, points, many, BEAD * width, identity, look)

@@ -1,4 +1,4 @@
-"""The kernels' groups of arrays, as they lie in a block, in mjData and in mjModel."""
+"""The kernels' groups of arrays, as views of a block, of mjData and of mjModel."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, S
 from mjwrap.kernels.solved import segments as sg
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import flags, reals, word
+from mjwrap.plugin.callbacks.memory import bool_array, float64_array, read_int64
 from mjwrap.plugin.callbacks.saving import floats, ints, sizes
 
 
@@ -29,7 +29,7 @@ def routes_of(block):
 @jit
 def muscles_of(block):
     """Return the group of muscles."""
-    n = word(block + 8 * bk.MUSCLES)
+    n = read_int64(block + 8 * bk.MUSCLES)
     return Muscles(
         ints(block, bk.A_LAW, (n,)),
         floats(block, bk.A_PARAMS, (n, PARAMS)),
@@ -40,21 +40,22 @@ def muscles_of(block):
         floats(block, bk.A_CTRL_HIGH, (n,)),
         ints(block, bk.A_FORM, (n,)),
         floats(block, bk.A_TIMES, (n, TIMES)),
-        flags(block + word(block + 8 * bk.A_OFF), (n,)),
+        bool_array(block + read_int64(block + 8 * bk.A_OFF), (n,)),
     )
 
 
 @jit
 def poses_of(block, data):
     """Return the group of poses and velocities in mjData."""
-    bodies, sites, geoms = word(block + 8 * bk.BODIES), word(block + 8 * bk.SITES), word(block + 8 * bk.GEOMS)
+    bodies, sites = read_int64(block + 8 * bk.BODIES), read_int64(block + 8 * bk.SITES)
+    geoms = read_int64(block + 8 * bk.GEOMS)
     return Poses(
-        reals(word(data + word(block + 8 * bk.SITE_XPOS)), (sites, 3)),
-        reals(word(data + word(block + 8 * bk.GEOM_XPOS)), (geoms, 3)),
-        reals(word(data + word(block + 8 * bk.GEOM_XMAT)), (geoms, 9)),
-        reals(word(data + word(block + 8 * bk.CVEL)), (bodies, 6)),
-        reals(word(data + word(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
-        reals(word(data + word(block + 8 * bk.XIPOS)), (bodies, 3)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.SITE_XPOS)), (sites, 3)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.GEOM_XPOS)), (geoms, 3)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.GEOM_XMAT)), (geoms, 9)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.CVEL)), (bodies, 6)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.SUBTREE_COM)), (bodies, 3)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.XIPOS)), (bodies, 3)),
         ints(block, bk.A_BODY_ROOTID, (bodies,)),
     )
 
@@ -62,10 +63,12 @@ def poses_of(block, data):
 @jit
 def inputs_of(block, data):
     """Return the group of controls and kept states."""
-    n = word(block + 8 * bk.MUSCLES)
+    n = read_int64(block + 8 * bk.MUSCLES)
     return Inputs(
-        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
-        reals(word(data + word(block + 8 * bk.CTRL)), (word(block + 8 * bk.CTRLS),)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.ACT)), (read_int64(block + 8 * bk.ACTS),)),
+        float64_array(
+            read_int64(data + read_int64(block + 8 * bk.CTRL)), (read_int64(block + 8 * bk.CTRLS),)
+        ),
         floats(block, bk.A_OWN, (n, 2)),
         floats(block, bk.A_EXCITATION, (n,)),
     )
@@ -86,7 +89,7 @@ def paths_of(block):
 @jit
 def start_of(block):
     """Return the group of drives and states at the start of the step."""
-    n = word(block + 8 * bk.MUSCLES)
+    n = read_int64(block + 8 * bk.MUSCLES)
     return StepStart(
         floats(block, bk.A_DRIVE, (n,)),
         floats(block, bk.A_START_ACTIVATION, (n,)),
@@ -97,8 +100,8 @@ def start_of(block):
 
 @jit
 def states_of(block):
-    """Return the group of what an evaluation finds."""
-    n = word(block + 8 * bk.MUSCLES)
+    """Return the group of an evaluation's results."""
+    n = read_int64(block + 8 * bk.MUSCLES)
     return MuscleStates(
         floats(block, bk.A_ACTIVATION, (n,)),
         floats(block, bk.A_FIBER, (n,)),

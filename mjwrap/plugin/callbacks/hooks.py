@@ -1,7 +1,7 @@
-"""Compiles the functions whose addresses stand in mjpPlugin: each finds its instance's block and works on it.
+"""Compile the functions whose addresses are in mjpPlugin: each finds the block of its instance and works on it.
 
-A mjData without a block is left alone: while a model compiles, MuJoCo steps data that no plugin has initialised, and
-there plugin_data holds whatever was in memory before; only mjData.nplugin tells.
+An mjData without a block is ignored. While a model compiles, MuJoCo steps data that no plugin has initialised; their
+plugin_data is not defined, so only mjData.nplugin shows that they have no block.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from mjwrap.plugin.callbacks import drawing
 from mjwrap.plugin.callbacks import stage as st
 from mjwrap.plugin.callbacks._cache import callback, jit
 from mjwrap.plugin.callbacks.block_table import block_at, block_of_state, place_of, remove_entry
-from mjwrap.plugin.callbacks.memory import call, call_with_four, store_word, word
+from mjwrap.plugin.callbacks.memory import call, call_with_four, read_int64, write_int64
 
 _WORD, _INT = types.int64, types.int32
 
 
 class Hooks(NamedTuple):
-    """Compiled callbacks, each with an `address`; their order is that of mjpPlugin."""
+    """Compiled callbacks, each with an `address`, in the order of mjpPlugin."""
 
     destroy: Any
     copy: Any
@@ -49,7 +49,7 @@ def _evaluation() -> tuple[Any, ...]:
     def group(kind: Any) -> Any:
         return types.BaseTuple.from_types(
             compiled_types(kind), kind
-        )  # one type for all fields is another type
+        )  # a tuple whose fields all have one type is a different numba type
 
     return (
         group(Routes), group(Muscles), group(Poses), group(Inputs), group(Timing), types.float64,
@@ -58,9 +58,9 @@ def _evaluation() -> tuple[Any, ...]:
 
 
 def compile_entries() -> Entries:
-    """Compile, or load, what is the same for every MuJoCo: the one place where the kernels are linked in.
+    """Compile, or load, the functions that are the same for every MuJoCo; only here the kernels are linked.
 
-    Large kernels are called by symbols, `evaluate` among them. They have to be defined here: numba loads a C function
+    Large kernels such as `evaluate` are called by symbols. These must be defined here, because numba loads a C function
     from its cache without them.
     """
     signature = types.void(_WORD, _WORD, _WORD)
@@ -72,30 +72,30 @@ def compile_entries() -> Entries:
 
 @jit
 def _block(data, instance, nplugin, plugin_data):
-    """Return the address of an instance's block, 0 where there is none."""
+    """Return the address of an instance's block, 0 if there is none."""
     return block_at(place_of(data, instance, nplugin, plugin_data))
 
 
 def compile_hooks(offsets: dict[str, int]) -> Hooks:
-    """Compile, or load, the callbacks for the mjData whose `nplugin` and `plugin_data` lie at these offsets."""
+    """Compile, or load, the callbacks for an mjData with `nplugin` and `plugin_data` at these offsets."""
     nplugin, plugin_data = offsets["nplugin"], offsets["plugin_data"]
 
     def destroy(data, instance):
         place = place_of(data, instance, nplugin, plugin_data)
         if place != 0:
             block = block_at(place)
-            store_word(word(data + plugin_data) + 8 * instance, 0)
+            write_int64(read_int64(data + plugin_data) + 8 * instance, 0)
             remove_entry(place)
-            call(word(block + 8 * bk.FREE), block, 0, 0)
+            call(read_int64(block + 8 * bk.FREE), block, 0, 0)
 
     def copy(target, model, origin, instance):
         to, given = (
             _block(target, instance, nplugin, plugin_data),
             _block(origin, instance, nplugin, plugin_data),
         )
-        if to != 0 and given != 0 and word(to) == word(given):
-            for i in range(word(given) // 8):
-                store_word(to + 8 * i, word(given + 8 * i))
+        if to != 0 and given != 0 and read_int64(to) == read_int64(given):
+            for i in range(read_int64(given) // 8):
+                write_int64(to + 8 * i, read_int64(given + 8 * i))
 
     def reset(model, state, place, instance):
         block = block_of_state(place, instance, state) if place != 0 else 0
@@ -105,17 +105,17 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
     def compute(model, data, instance, capability):
         block = _block(data, instance, nplugin, plugin_data)
         if block != 0:
-            call(word(block + 8 * bk.STAGE), block, model, data)
+            call(read_int64(block + 8 * bk.STAGE), block, model, data)
 
     def advance(model, data, instance):
         block = _block(data, instance, nplugin, plugin_data)
         if block != 0:
-            call(word(block + 8 * bk.FINISH), block, model, data)
+            call(read_int64(block + 8 * bk.FINISH), block, model, data)
 
     def visualize(model, data, option, scene, instance):
         block = _block(data, instance, nplugin, plugin_data)
-        if block != 0 and word(block + 8 * bk.DRAW) != 0:
-            call_with_four(word(block + 8 * bk.DRAW), block, model, option, scene)
+        if block != 0 and read_int64(block + 8 * bk.DRAW) != 0:
+            call_with_four(read_int64(block + 8 * bk.DRAW), block, model, option, scene)
 
     return Hooks(
         callback(types.void(_WORD, _INT), destroy),

@@ -1,4 +1,4 @@
-"""Reads and writes memory at addresses in compiled code, and calls functions by their addresses."""
+"""Read and write memory at addresses in compiled code, and call functions by their addresses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numba.np.numpy_support import carray
 from mjwrap.plugin.callbacks._cache import jit
 
 _WORD = ir.IntType(64)
-intrinsic: Any = numba_intrinsic  # what it returns takes other arguments than what it decorates
+intrinsic: Any = numba_intrinsic  # Any: the decorated function takes other arguments than it is written with
 
 
 def _load(kind: Any, numba_type: Any) -> Any:
@@ -26,16 +26,16 @@ def _load(kind: Any, numba_type: Any) -> Any:
     return intrinsic(typed)
 
 
-word: Any = _load(_WORD, types.int64)  # the 64-bit integer at an address
-half: Any = _load(ir.IntType(32), types.int32)  # the 32-bit integer at an address
-byte: Any = _load(ir.IntType(8), types.uint8)  # the byte at an address
-real: Any = _load(ir.DoubleType(), types.float64)  # the double at an address
-single: Any = _load(ir.FloatType(), types.float32)  # the float at an address
+read_int64: Any = _load(_WORD, types.int64)  # the 64-bit integer at an address
+read_int32: Any = _load(ir.IntType(32), types.int32)  # the 32-bit integer at an address
+read_uint8: Any = _load(ir.IntType(8), types.uint8)  # the byte at an address
+read_float64: Any = _load(ir.DoubleType(), types.float64)  # the double at an address
+read_float32: Any = _load(ir.FloatType(), types.float32)  # the float at an address
 
 
 @intrinsic
 def pointer(typing_context: Any, address: Any) -> Any:
-    """Return an address as a pointer of no type."""
+    """Return an address as a void pointer."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], cgutils.voidptr_t)
@@ -44,7 +44,7 @@ def pointer(typing_context: Any, address: Any) -> Any:
 
 
 @intrinsic
-def store_word(typing_context: Any, address: Any, value: Any) -> Any:
+def write_int64(typing_context: Any, address: Any, value: Any) -> Any:
     """Write a 64-bit integer to an address."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -55,7 +55,7 @@ def store_word(typing_context: Any, address: Any, value: Any) -> Any:
 
 
 def _calling(number: int) -> Any:
-    """Return how a function of `number` words is called by its address."""
+    """Return the signature and code generator of a call, by address, of a function of `number` 64-bit integers."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(ir.VoidType(), [_WORD] * number)
@@ -67,7 +67,7 @@ def _calling(number: int) -> Any:
 
 @intrinsic
 def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any) -> Any:
-    """Call void f(word, word, word) by its address."""
+    """Call void f(int64, int64, int64) by its address."""
     return _calling(3)
 
 
@@ -75,41 +75,41 @@ def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any
 def call_with_four(
     typing_context: Any, function: Any, first: Any, second: Any, third: Any, fourth: Any
 ) -> Any:
-    """Call void f(word, word, word, word) by its address."""
+    """Call void f(int64, int64, int64, int64) by its address."""
     return _calling(4)
 
 
 @jit
-def reals(address, shape):
+def float64_array(address, shape):
     """Return the doubles at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.float64)
 
 
 @jit
-def words(address, shape):
+def int64_array(address, shape):
     """Return the 64-bit integers at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.int64)
 
 
 @jit
-def halves(address, shape):
+def int32_array(address, shape):
     """Return the 32-bit integers at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.int32)
 
 
 @jit
-def flags(address, shape):
+def bool_array(address, shape):
     """Return the bytes at an address as an array of booleans of the given shape."""
     return carray(pointer(address), shape, np.bool_)
 
 
 @jit
-def singles(address, shape):
+def float32_array(address, shape):
     """Return the floats at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.float32)
 
 
 @jit
-def octets(address, shape):
+def uint8_array(address, shape):
     """Return the bytes at an address as an array of the given shape."""
     return carray(pointer(address), shape, np.uint8)

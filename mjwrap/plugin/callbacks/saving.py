@@ -1,9 +1,9 @@
-"""Reads the arrays of a block from an instance's part of plugin_state, and writes them there.
+"""Read the arrays of a block from an instance's part of plugin_state, and write them there.
 
 Numbers in plugin_state, per instance: the time at which the last step ended; activation and fibre length of muscles
-that keep them nowhere else (n, 2); excitations (n,); length, velocity and tension (3, n) and the segments of the last
-good paths; the saved solution and the hint of every surface; what is in xfrc_applied now. Zeros are a cold start: so a
-state made by hand is as good as one that MuJoCo has reset.
+that have them nowhere else (n, 2); excitations (n,); length, velocity and tension (3, n) and the segments of the last
+valid paths; the saved solution and the hint of every surface; the forces now in xfrc_applied. Zeros are a cold start,
+so that a state made by hand works like one that MuJoCo has reset.
 """
 
 from __future__ import annotations
@@ -14,41 +14,43 @@ from mjwrap.kernels.solved import segments as sg
 from mjwrap.kernels.spans.end_inside import has_valid_length
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import reals, word, words
+from mjwrap.plugin.callbacks.memory import float64_array, int64_array, read_int64
 
 PER_MUSCLE = 6
-SAVED = lay.STATE + 4  # of a surface: the solution, then the hint
+SAVED = lay.STATE + 4  # numbers per surface: the solution, then the hint
 
 
 @jit
 def floats(block, which, shape):
-    return reals(block + word(block + 8 * which), shape)
+    return float64_array(block + read_int64(block + 8 * which), shape)
 
 
 @jit
 def ints(block, which, shape):
-    return words(block + word(block + 8 * which), shape)
+    return int64_array(block + read_int64(block + 8 * which), shape)
 
 
 @jit
 def state_of(block, data):
     """Return the instance's part of plugin_state."""
-    start = word(data + word(block + 8 * bk.PLUGIN_STATE)) + 8 * word(block + 8 * bk.STATE_ADDRESS)
-    return reals(start, (word(block + 8 * bk.NSTATE),))
+    start = read_int64(data + read_int64(block + 8 * bk.PLUGIN_STATE)) + 8 * read_int64(
+        block + 8 * bk.STATE_ADDRESS
+    )
+    return float64_array(start, (read_int64(block + 8 * bk.NSTATE),))
 
 
 @jit
 def sizes(block):
     """Return the numbers of muscles, nodes, routes and bodies."""
-    n, nodes = word(block + 8 * bk.MUSCLES), word(block + 8 * bk.NODES)
-    return n, nodes, word(block + 8 * bk.ROUTES), word(block + 8 * bk.BODIES)
+    n, nodes = read_int64(block + 8 * bk.MUSCLES), read_int64(block + 8 * bk.NODES)
+    return n, nodes, read_int64(block + 8 * bk.ROUTES), read_int64(block + 8 * bk.BODIES)
 
 
 @jit
 def load(block, state):
     """Read own states, excitations, last lengths and forces, and the surfaces' warm starts from plugin_state.
 
-    Modes are stored as their distance from COLD, so that zeros are cold.
+    Modes are stored relative to COLD, so that zeros are a cold start.
     """
     n, nodes, routes, _ = sizes(block)
     node, links = floats(block, bk.A_NODE, (nodes, lay.ROW)), ints(block, bk.A_LINKS, (nodes, 4))
@@ -73,18 +75,18 @@ def load(block, state):
             for i in range(4):
                 node[k, lay.HINT + i] = state[at + lay.STATE + i]
             at += SAVED
-        at += _room(c, route)
+        at += _segment_numbers(c, route)
 
 
 @jit
-def _room(c, route):
-    """Return how many numbers of plugin_state the segments of route c have: their count, then a row for each."""
+def _segment_numbers(c, route):
+    """Return the number of entries of plugin_state for the segments of route c: their count, and a row for each."""
     return 1 + sg.SEGMENT * (route[c, R_HI] - route[c, R_LO] + 1)
 
 
 @jit
 def _copy(count, origin, first, target, place):
-    """Copy numbers from origin[first:] to target[place:], through views: else every index is checked for its sign."""
+    """Copy numbers from origin[first:] to target[place:]; views, because numba tests the sign of every index else."""
     taken, given = origin[first:], target[place:]
     for i in range(count):
         given[i] = taken[i]
@@ -92,7 +94,7 @@ def _copy(count, origin, first, target, place):
 
 @jit
 def load_held(block, state):
-    """Read the segments of the last good paths of the routes that have none now."""
+    """Read the segments of the last valid paths of routes that have no path now."""
     n, nodes, routes, _ = sizes(block)
     route, info = ints(block, bk.A_ROUTES, (routes, ROUTE)), floats(block, bk.A_INFO, (routes, lay.INFO))
     seg, count = (
@@ -106,15 +108,15 @@ def load_held(block, state):
         at += SAVED * route[c, R_SURFACES]
         if not has_valid_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
             most = route[c, R_HI] - route[c, R_LO] + 1
-            fits = 0.0 <= state[at] <= most  # anybody may write to plugin_state
+            fits = 0.0 <= state[at] <= most  # the user may have written to plugin_state
             count[c] = int(state[at]) if fits else 0
             _copy(sg.SEGMENT * count[c], state, at + 1, seg, sg.SEGMENT * (route[c, R_LO] + c))
-        at += _room(c, route)
+        at += _segment_numbers(c, route)
 
 
 @jit
 def save(block, state):
-    """Write what `load` and `load_held` read, but for the excitations, which are the user's."""
+    """Write what `load` and `load_held` read, except for the excitations, which the user sets."""
     n, nodes, routes, _ = sizes(block)
     node, links = floats(block, bk.A_NODE, (nodes, lay.ROW)), ints(block, bk.A_LINKS, (nodes, 4))
     seg, count = (
@@ -143,4 +145,4 @@ def save(block, state):
             at += SAVED
         state[at] = count[c]
         _copy(sg.SEGMENT * count[c], seg, sg.SEGMENT * (route[c, R_LO] + c), state, at + 1)
-        at += _room(c, route)
+        at += _segment_numbers(c, route)

@@ -1,6 +1,7 @@
-"""Evaluates an instance's muscles inside MuJoCo, and ends a step.
+"""Evaluate an instance's muscles inside MuJoCo, and complete a step.
 
-`stage` and `finish` are compiled in `hooks.py`, as C functions only: another layer would optimise all kernels again.
+`stage` and `finish` are compiled only in `hooks.py`, as C functions: compiled here too, they would optimise all kernels
+a second time.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from mjwrap.kernels.musculotendon.dynamics import write_states
 from mjwrap.kernels.musculotendon.groups import Timing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.follow import follow
 from mjwrap.plugin.callbacks.groups import (
     inputs_of,
     muscles_of,
@@ -22,8 +22,9 @@ from mjwrap.plugin.callbacks.groups import (
     start_of,
     states_of,
 )
-from mjwrap.plugin.callbacks.memory import flags, half, real, reals, word
+from mjwrap.plugin.callbacks.memory import bool_array, float64_array, read_float64, read_int32, read_int64
 from mjwrap.plugin.callbacks.saving import floats, ints, load, load_held, save, sizes, state_of
+from mjwrap.plugin.callbacks.sync import sync_with_model
 from mjwrap.plugin.callbacks.transmission import transmit
 
 TOLERANCE = 1e-10  # largest tangency error of a path, as in MuscleSystem
@@ -33,21 +34,21 @@ GROUPS = 31  # actuator groups that options can switch off
 @jit
 def _forces(block, data):
     """Return xfrc_applied and the arrays that `wrenches.add_to_xfrc` and `remove_from_xfrc` share."""
-    bodies = word(block + 8 * bk.BODIES)
+    bodies = read_int64(block + 8 * bk.BODIES)
     return (
-        reals(word(data + word(block + 8 * bk.XFRC)), (bodies, 6)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.XFRC)), (bodies, 6)),
         floats(block, bk.A_OTHERS, (bodies, 6)),
         floats(block, bk.A_MINE, (bodies, 6)),
         floats(block, bk.A_TOTAL, (bodies, 6)),
-        flags(block + word(block + 8 * bk.A_WRITTEN), (bodies,)),
+        bool_array(block + read_int64(block + 8 * bk.A_WRITTEN), (bodies,)),
     )
 
 
 @jit
 def _remove_wrenches(block, data, state):
-    """Take out of xfrc_applied what this instance put in, or what a restored state says that it had."""
+    """Remove from xfrc_applied the forces that this instance, or a restored state of it, had added."""
     xfrc, others, mine, total, written = _forces(block, data)
-    loaded = ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
+    loaded = ints(block, bk.A_LOADED, (read_int64(block + 8 * bk.LOADED),))
     at = state.shape[0] - 13 * loaded.shape[0]
     for j in range(loaded.shape[0]):
         b = loaded[j]
@@ -67,10 +68,10 @@ def _remove_wrenches(block, data, state):
 
 @jit
 def _add_wrenches(block, data, state, wrench):
-    """Put the wrench into xfrc_applied and note in plugin_state what is there now."""
+    """Add the wrench to xfrc_applied, and store the sum in plugin_state."""
     xfrc, others, mine, total, written = _forces(block, data)
     add_to_xfrc(xfrc, others, mine, total, written, wrench)
-    loaded = ints(block, bk.A_LOADED, (word(block + 8 * bk.LOADED),))
+    loaded = ints(block, bk.A_LOADED, (read_int64(block + 8 * bk.LOADED),))
     at = state.shape[0] - 13 * loaded.shape[0]
     for j in range(loaded.shape[0]):
         b = loaded[j]
@@ -83,17 +84,17 @@ def _add_wrenches(block, data, state, wrench):
 
 @jit
 def _erase_paths(block):
-    """Leave no path to draw; those that the next evaluation needs are in plugin_state."""
-    count = ints(block, bk.A_COUNT, (word(block + 8 * bk.ROUTES),))
+    """Erase the paths that are drawn; the next evaluation starts from those in plugin_state."""
+    count = ints(block, bk.A_COUNT, (read_int64(block + 8 * bk.ROUTES),))
     for c in range(count.shape[0]):
         count[c] = 0
 
 
 @jit
 def _time_since_start(time, step, ended, clock):
-    """Return how long ago the step began [s] to which this stage of Runge-Kutta belongs.
+    """Return the time since the start of the step of this Runge-Kutta stage [s].
 
-    A stage's time is computed as the step's start plus half or all of a step, so it is recognised to the bit.
+    A stage's time is the start of the step plus half or all of a step, so it can be compared exactly.
     """
     for start in (ended, clock[bk.FIRST]):
         if time == start:
@@ -107,28 +108,31 @@ def _time_since_start(time, step, ended, clock):
 
 
 def stage(block, model, data):
-    """Evaluate the instance's muscles at the poses and velocities in mjData, and act: by wrenches or transmission."""
+    """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions."""
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
-    part = block + word(block + 8 * bk.A_TRANSMISSION)
-    transmits = word(part) != 0
-    idle = half(model + word(block + 8 * bk.DISABLEFLAGS)) & word(block + 8 * bk.NO_ACTUATION) != 0
+    part = block + read_int64(block + 8 * bk.A_TRANSMISSION)
+    transmits = read_int64(part) != 0
+    idle = (
+        read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS)) & read_int64(block + 8 * bk.NO_ACTUATION)
+        != 0
+    )
     if idle and not transmits:
         clock[bk.ACTED] = 0.0
         _erase_paths(block)
         return
     n, _, _, bodies = sizes(block)
-    step, since, ahead = real(model + word(block + 8 * bk.TIMESTEP)), 0.0, 0.0
-    if half(model + word(block + 8 * bk.INTEGRATOR)) == word(block + 8 * bk.RUNGE_KUTTA):
-        since = _time_since_start(real(data + word(block + 8 * bk.TIME)), step, state[0], clock)
+    step, since, ahead = read_float64(model + read_int64(block + 8 * bk.TIMESTEP)), 0.0, 0.0
+    if read_int32(model + read_int64(block + 8 * bk.INTEGRATOR)) == read_int64(block + 8 * bk.RUNGE_KUTTA):
+        since = _time_since_start(read_float64(data + read_int64(block + 8 * bk.TIME)), step, state[0], clock)
     else:
         ahead = step
     if since == 0.0:
-        follow(block, model)
+        sync_with_model(block, model)
         load(block, state)
-    off, group = flags(block + word(block + 8 * bk.A_OFF), (n,)), ints(block, bk.A_GROUP, (n,))
-    switched = half(model + word(block + 8 * bk.DISABLEACTUATOR))
+    off, group = bool_array(block + read_int64(block + 8 * bk.A_OFF), (n,)), ints(block, bk.A_GROUP, (n,))
+    switched = read_int32(model + read_int64(block + 8 * bk.DISABLEACTUATOR))
     for m in range(n):
         off[m] = idle or group[m] == bk.SILENT
         off[m] = off[m] or (0 <= group[m] < GROUPS and ((switched >> group[m]) & 1) != 0)
@@ -142,7 +146,7 @@ def stage(block, model, data):
     if failed and since == 0.0:
         load_held(block, state)
         body_wrenches(routes, poses, paths, states.tension, wrench)
-    lost = flags(block + word(block + 8 * bk.A_LOST), (n,))
+    lost = bool_array(block + read_int64(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
         lost[m] = states.status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _add_wrenches(block, data, state, wrench)
@@ -152,26 +156,29 @@ def stage(block, model, data):
 
 
 def finish(block, model, data):
-    """End a step: leave others' forces in xfrc_applied, keep states and warm starts in plugin_state."""
+    """Complete a step: remove the muscles' forces from xfrc_applied; store states and warm starts in plugin_state."""
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
     clock[bk.FIRST] = -1.0
-    state[0] = real(data + word(block + 8 * bk.TIME))
+    state[0] = read_float64(data + read_int64(block + 8 * bk.TIME))
     if clock[bk.ACTED] == 0.0:
         return
     clock[bk.ACTED] = 0.0
-    n = word(block + 8 * bk.MUSCLES)
+    n = read_int64(block + 8 * bk.MUSCLES)
     write_states(
         ints(block, bk.A_SOURCE, (n,)),
         ints(block, bk.A_INDEX, (n,)),
         floats(block, bk.A_NEXT_ACTIVATION, (n,)),
         floats(block, bk.A_NEXT_FIBER, (n,)),
-        reals(word(data + word(block + 8 * bk.ACT)), (word(block + 8 * bk.ACTS),)),
+        float64_array(read_int64(data + read_int64(block + 8 * bk.ACT)), (read_int64(block + 8 * bk.ACTS),)),
         floats(block, bk.A_OWN, (n, 2)),
     )
     save(block, state)
-    lost, failures = flags(block + word(block + 8 * bk.A_LOST), (n,)), ints(block, bk.A_FAILURES, (n,))
+    lost, failures = (
+        bool_array(block + read_int64(block + 8 * bk.A_LOST), (n,)),
+        ints(block, bk.A_FAILURES, (n,)),
+    )
     for m in range(n):
         if lost[m]:
             failures[m] += 1
@@ -179,11 +186,11 @@ def finish(block, model, data):
 
 @jit
 def restart(block, state):
-    """After a reset of mjData, which has cleared xfrc_applied: start cold, with nothing to take back.
+    """Start cold after a reset of mjData, which has cleared xfrc_applied: there are no forces to remove.
 
-    state: address of the instance's numbers in plugin_state, which MuJoCo leaves as they were, or undefined.
+    state: address of the instance's numbers in plugin_state, which a reset does not define.
     """
-    cold = reals(state, (word(block + 8 * bk.NSTATE),))
+    cold = float64_array(state, (read_int64(block + 8 * bk.NSTATE),))
     for i in range(cold.shape[0]):
         cold[i] = 0.0
     _erase_paths(block)
@@ -191,7 +198,7 @@ def restart(block, state):
     failures = ints(block, bk.A_FAILURES, (n,))
     for m in range(n):
         failures[m] = 0
-    written = flags(block + word(block + 8 * bk.A_WRITTEN), (bodies,))
+    written = bool_array(block + read_int64(block + 8 * bk.A_WRITTEN), (bodies,))
     for b in range(bodies):
         written[b] = False
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))

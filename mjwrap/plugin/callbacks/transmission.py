@@ -1,9 +1,9 @@
-"""Gives MuJoCo's own actuators length, velocity and moment along mjwrap's paths.
+"""Give MuJoCo's own actuators length, velocity and moment along mjwrap's paths.
 
-MuJoCo computes these three in its position and velocity stages, then passive forces, at which the plugin is called, and
-only then the forces of actuators: so what is written in between is what gain, bias, clamps, sensors of velocity and
-force, and the derivatives of the implicit integrators see. What it needs beside the block of the instance lies in a
-part of that block with a head of its own, which `mjwrap/plugin/blocks/transmission_part.py` writes.
+MuJoCo computes these three in its position and velocity stages, then passive forces, for which it calls the plugin, and
+after these the forces of actuators. So the values that the plugin writes are used by gain, bias, clamps, sensors of
+velocity and force, and the derivatives of the implicit integrators. The additional data are in a part of the instance's
+block with a head of its own, which `mjwrap/plugin/blocks/transmission_part.py` writes.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from mjwrap.kernels.coupling.groups import Dofs, Transmissions
 from mjwrap.kernels.coupling.moments import write_transmissions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import half, halves, reals, word, words
+from mjwrap.plugin.callbacks.memory import float64_array, int32_array, int64_array, read_int32, read_int64
 
-# sizes; COUNT: of muscles whose actuators pull, 0 where all act by wrenches and nothing else is filled
+# sizes; COUNT: number of muscles whose actuators pull; if it is 0, all act by wrenches and the rest is not filled
 COUNT, DOFS, OUTPUTS, MOMENTS, TENDONS, TENDON_MOMENTS, SENSORS, SENSOR_NUMBERS = range(8)
 NO_SENSORS = 8  # the bit of `disableflags` that switches sensors off
 # byte offsets of mjData's fields, then of mjModel's
@@ -25,8 +25,8 @@ FIELDS = (
 (
     CDOF, LENGTH, VELOCITY, ROWNNZ, ROWADR, COLIND, MOMENT, TEN_LENGTH, TEN_VELOCITY, TEN_J, SENSORDATA, GEAR,
 ) = range(9, 9 + len(FIELDS))  # fmt: skip
-# where the arrays start: `write_transmissions` says what the first six are; sensors of the position stage, their
-# numbers' index, muscle and whether it is an actuator's (k, 3), and their least and largest value (k, 2)
+# offsets of the arrays: the first six as for `write_transmissions`; sensors of the position stage (k, 3): index of the
+# number, muscle, whether it is an actuator's; their smallest and largest values (k, 2)
 ARRAYS = ("output", "tendon", "tendon_row", "last_dof", "dof_parentid", "row", "sensor", "limits")
 A_OUTPUT, A_TENDON, A_TENDON_ROW, A_LAST_DOF, A_PARENT, A_ROW, A_SENSOR, A_LIMITS = range(
     24, 24 + len(ARRAYS)
@@ -36,30 +36,30 @@ HEAD = 24 + len(ARRAYS)
 
 @jit
 def _ints(part, which, shape):
-    return words(part + word(part + 8 * which), shape)
+    return int64_array(part + read_int64(part + 8 * which), shape)
 
 
 @jit
 def _floats(part, which, shape):
-    return reals(part + word(part + 8 * which), shape)
+    return float64_array(part + read_int64(part + 8 * which), shape)
 
 
 @jit
 def _field(part, which, owner, shape):
     """Return the array of doubles to which a field of mjData, or mjModel, points."""
-    return reals(word(owner + word(part + 8 * which)), shape)
+    return float64_array(read_int64(owner + read_int64(part + 8 * which)), shape)
 
 
 @jit
 def _indices(part, which, owner, shape):
-    return halves(word(owner + word(part + 8 * which)), shape)
+    return int32_array(read_int64(owner + read_int64(part + 8 * which)), shape)
 
 
 @jit
 def transmit(part, block, model, data, first_stage, routes, poses, paths, states):
-    """Write what the actuators of an instance's muscles see; first_stage: sensors, too, show the present state."""
-    n, dofs, outputs = states.length.shape[0], word(part + 8 * DOFS), word(part + 8 * OUTPUTS)
-    entries, tendons = word(part + 8 * MOMENTS), word(part + 8 * TENDONS)
+    """Write length, velocity and moment of the actuators; first_stage: also the sensors of the position stage."""
+    n, dofs, outputs = states.length.shape[0], read_int64(part + 8 * DOFS), read_int64(part + 8 * OUTPUTS)
+    entries, tendons = read_int64(part + 8 * MOMENTS), read_int64(part + 8 * TENDONS)
     bodies = poses.body_rootid.shape[0]
     tree = Dofs(
         _ints(part, A_LAST_DOF, (bodies,)),
@@ -81,16 +81,16 @@ def transmit(part, block, model, data, first_stage, routes, poses, paths, states
         _field(part, MOMENT, data, (entries,)),
         _field(part, TEN_LENGTH, data, (tendons,)),
         _field(part, TEN_VELOCITY, data, (tendons,)),
-        _field(part, TEN_J, data, (word(part + 8 * TENDON_MOMENTS),)),
+        _field(part, TEN_J, data, (read_int64(part + 8 * TENDON_MOMENTS),)),
     )
     row = _floats(part, A_ROW, (dofs,))
     write_transmissions(routes, paths, tree, states.length, states.velocity, targets, row)
-    flags = half(model + word(block + 8 * bk.DISABLEFLAGS))
-    if not first_stage or flags & word(part + 8 * NO_SENSORS):
+    flags = read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS))
+    if not first_stage or flags & read_int64(part + 8 * NO_SENSORS):
         return
-    sensors = word(part + 8 * SENSORS)
+    sensors = read_int64(part + 8 * SENSORS)
     sensor, limits = _ints(part, A_SENSOR, (sensors, 3)), _floats(part, A_LIMITS, (sensors, 2))
-    shown = _field(part, SENSORDATA, data, (word(part + 8 * SENSOR_NUMBERS),))
+    shown = _field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
     for k in range(sensors):
         m = sensor[k, 1]
         value = targets.actuator_length[targets.output[m]]

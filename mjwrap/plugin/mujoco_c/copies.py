@@ -1,7 +1,7 @@
-"""Copies a model of which only the address is known, to read its declarations from.
+"""Copy a model of which only the address is known, so that its declarations can be read.
 
-MuJoCo makes a copy by writing the model in its binary form and reading that again, which takes most of a second for
-large meshes. So the copy of a model that comes twice is kept, and takes over the arrays of others of the same sizes.
+MuJoCo copies a model by writing it in binary form and reading that, which takes most of a second for large meshes. So
+the copy of a model that is requested twice is kept, and reused for models of the same sizes by copying their arrays.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from mjwrap.plugin.mujoco_c.fingerprint import buffer_layout
 from mjwrap.plugin.mujoco_c.library import saved_model
 
 _MOST = 2
-_kept: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()  # by sizes; None: they came once
+_kept: OrderedDict[bytes, mujoco.MjModel | None] = OrderedDict()  # by sizes; None: requested once so far
 
 
 def _buffer(address: int) -> tuple[int, int]:
-    """Return where a model's arrays lie, and how many bytes they are."""
+    """Return the address of a model's arrays, and their size in bytes."""
     layout = buffer_layout()
     start = ctypes.c_uint64.from_address(address + layout.buffer).value
     return start, ctypes.c_int64.from_address(address + layout.nbuffer).value
 
 
 def copy_of(address: int) -> mujoco.MjModel:
-    """Return a copy of the model at an address, good until the next call; all but its options, which nobody reads."""
+    """Return a copy of the model at an address, valid until the next call; its options are not copied."""
     sizes = ctypes.string_at(address, buffer_layout().sizes)
     kept = _kept.get(sizes)
     if kept is None:

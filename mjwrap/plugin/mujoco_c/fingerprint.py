@@ -1,7 +1,7 @@
-"""Hashes what the plugin reads of a model, without copying it; models of one hash share their muscles' arrays.
+"""Hash the parts of a model that the plugin reads, without copying it; models with equal hashes share arrays.
 
-The arrays of an mjModel lie one after the other in one buffer, so each ends where the next begins. Meshes, textures and
-the like, nearly all of its bytes, are left out: no muscle depends on them.
+The arrays of an mjModel are consecutive in one buffer, so that each ends where the next begins. Meshes, textures and
+similar arrays, which have nearly all of its bytes, are left out: no muscle depends on them.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ _LEFT_OUT = ("mesh_", "tex_", "mat_", "skin_", "hfield_", "bvh_", "oct_", "flex"
 
 @functools.cache
 def buffer_layout() -> ModelBuffer:
-    """Return where mjModel keeps its arrays, found once."""
+    """Return the layout of mjModel's arrays, found once."""
     return model_buffer()
 
 
 def fingerprint(address: int) -> bytes | None:
-    """Return the hash of the model at an address, or None where its arrays do not lie as they should."""
+    """Return the hash of the model at an address, or None if its arrays are not laid out as expected."""
     layout = buffer_layout()
     start = ctypes.c_uint64.from_address(address + layout.buffer).value
     end = start + ctypes.c_int64.from_address(address + layout.nbuffer).value

@@ -1,4 +1,4 @@
-"""Loads MuJoCo's own C library, the one that the Python bindings use, through ctypes."""
+"""Load the C library of MuJoCo that the Python bindings use, through ctypes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,9 @@ def library() -> Any:
     folder = Path(mujoco.__file__).parent
     names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib"), *folder.glob("mujoco.dll")]
     if not names:
-        raise VersionError(f"no MuJoCo library in {folder}; the engine plugin needs the one of the wheel")
+        raise VersionError(
+            f"no MuJoCo library in {folder}; the engine plugin needs the library of MuJoCo's wheel"
+        )
     loaded = ctypes.CDLL(str(names[0]))
     loaded.mjp_registerPlugin.argtypes = [ctypes.POINTER(MjpPlugin)]
     loaded.mjp_getPlugin.argtypes = [ctypes.c_char_p, ctypes.POINTER(ctypes.c_int)]

@@ -1,8 +1,8 @@
-"""Finds where the fields of MuJoCo's C structs lie in the installed MuJoCo, and verifies it, when first needed.
+"""Find the offsets of the fields of MuJoCo's C structs in the installed MuJoCo, and verify them, when first needed.
 
-Offsets move with almost every release. ctypes computes them from the struct declarations that the mujoco package
-carries (`mujoco.introspect`); then they are checked against models and data in memory, whose field addresses and values
-the Python bindings show. A MuJoCo that passes is used; any other is refused before anything is written.
+Offsets change with almost every release. ctypes computes them from the struct declarations in the mujoco package
+(`mujoco.introspect`). Then they are checked against models and data in memory, whose addresses and values the Python
+bindings show. A MuJoCo that passes is used; any other is refused before anything is written.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Offsets(NamedTuple):
 
 
 class ModelBuffer(NamedTuple):
-    """Where mjModel keeps its arrays: byte offsets of `buffer`, `nbuffer` and of the pointer to each array by name.
+    """The layout of mjModel's arrays: byte offsets of `buffer`, `nbuffer` and of the pointer to each array by name.
 
-    sizes [bytes]: how much of the struct, from its start, are the model's sizes.
+    sizes [bytes]: length of the first part of the struct, which contains the model's sizes.
     """
 
     buffer: int
@@ -63,7 +63,7 @@ def structs() -> Any:
     try:
         from mujoco.introspect import structs
     except ImportError:
-        raise refuse("it does not carry the declarations of its structs (mujoco.introspect)") from None
+        raise refuse("it does not contain the declarations of its structs (mujoco.introspect)") from None
     return structs.STRUCTS
 
 
@@ -85,7 +85,7 @@ def c_type(kind: Any) -> Any:
 
 
 def structure(fields: Any) -> type[ctypes.Structure]:
-    """Return the ctypes struct with the fields that `mujoco.introspect` lists; ctypes lays it out as C does."""
+    """Return the ctypes struct with the fields listed by `mujoco.introspect`; ctypes uses the layout of C."""
     declared = []
     for field in fields:
         if type(field).__name__ != "StructFieldDecl":
@@ -104,7 +104,7 @@ def field_offsets(fields: Any) -> tuple[dict[str, int], int]:
 
 
 def _probes() -> Iterator[tuple[mujoco.MjModel, mujoco.MjData]]:
-    """Yield models whose arrays all have room, of different sizes, with options of distinct values."""
+    """Yield models of different sizes, none of whose arrays is empty, with distinct values of the options."""
     for n in (2, 3, 5):
         spec = mujoco.MjSpec()
         for i in range(n):
@@ -133,7 +133,7 @@ def _probes() -> Iterator[tuple[mujoco.MjModel, mujoco.MjData]]:
 
 
 def check_pointer(owner: Any, field: str, offset: int) -> None:
-    """Raise unless the struct holds at `offset` the address of the array that Python shows under this name."""
+    """Raise unless the struct contains, at `offset`, the address of the array that Python shows by this name."""
     array = np.asarray(getattr(owner, field))
     found = ctypes.c_uint64.from_address(owner._address + offset).value
     if array.size == 0 or found != array.__array_interface__["data"][0]:
@@ -141,7 +141,7 @@ def check_pointer(owner: Any, field: str, offset: int) -> None:
 
 
 def check_value(owner: Any, field: str, kind: Any, offset: int, expected: float) -> None:
-    """Raise unless the struct holds a number of a ctypes kind at `offset` that is the expected one."""
+    """Raise unless the struct contains, at `offset`, the expected number of a ctypes kind."""
     found = kind.from_address(owner._address + offset).value
     if found != expected:
         raise refuse(f"{type(owner).__name__}.{field} is not where its declaration puts it")
@@ -149,7 +149,7 @@ def check_value(owner: Any, field: str, kind: Any, offset: int, expected: float)
 
 @functools.cache
 def offsets() -> Offsets:
-    """Return the offsets in the installed MuJoCo; `VersionError` where a field cannot be verified."""
+    """Return the offsets in the installed MuJoCo; `VersionError` if a field cannot be verified."""
     declared = structs()
     if ctypes.sizeof(ctypes.c_void_p) != 8 or np.dtype(np.uintp).itemsize != 8:
         raise refuse("this is not a 64-bit process")
@@ -177,7 +177,7 @@ def offsets() -> Offsets:
 
 
 def model_buffer() -> ModelBuffer:
-    """Return where mjModel keeps its arrays; `VersionError` where one of them is elsewhere in a model of ours."""
+    """Return the layout of mjModel's arrays; `VersionError` if one of them is elsewhere in a test model."""
     fields = structs()["mjModel"].fields
     at = field_offsets(fields)[0]
     pointers = {

@@ -1,4 +1,4 @@
-"""Verifies what only a model with plugins shows, with a plugin that does nothing."""
+"""Verify the fields that only a model with plugins has, using a plugin that does nothing."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _NOTHING = ctypes.CFUNCTYPE(None)
 
 
 def verify_plugin_fields() -> None:
-    """Raise `VersionError` where the fields of a model with two instances are not where they are declared."""
+    """Raise `VersionError` if the fields of a model with two instances are not where they are declared."""
     if ctypes.sizeof(MjpPlugin) != _PLUGIN_BYTES:
-        raise refuse("mjpPlugin has another size here than in C")
+        raise refuse("the size of mjpPlugin differs from that in C")
     two = _NSTATE(lambda model, instance: 2)
     ready = _INIT(lambda model, data, instance: 0)
     nothing = _NOTHING(lambda: None)

@@ -1,4 +1,4 @@
-"""Makes the error for a MuJoCo in which the plugin cannot run."""
+"""The error for a MuJoCo in which the plugin cannot run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from mjwrap.errors import VersionError
 
 
 def refuse(what: str) -> VersionError:
-    """Return the error that says what is wrong with the installed MuJoCo."""
+    """Return the error; what: the reason."""
     return VersionError(
         f"the engine plugin cannot run in MuJoCo {mujoco.__version__}: {what}; MuscleSystem works without it"
     )

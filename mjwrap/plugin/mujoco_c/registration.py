@@ -1,4 +1,4 @@
-"""Registers engine plugins with MuJoCo, which keeps them until the process ends."""
+"""Register engine plugins with MuJoCo, which keeps them until the process ends."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ _PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC
 
 
 def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str, ...] = ()) -> None:
-    """Register a plugin for passive forces unless one of this name is there already.
+    """Register a plugin for passive forces, unless one with this name is registered.
 
-    callbacks: numba or ctypes functions by their field in mjpPlugin; attributes: names of its configuration's texts.
+    callbacks: numba or ctypes functions by their field in mjpPlugin; attributes: names of its configuration values.
     """
     lib, slot = library(), ctypes.c_int(-1)
     if lib.mjp_getPlugin(name.encode(), ctypes.byref(slot)):
@@ -29,7 +29,7 @@ def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str,
 
 
 def keep_forever(thing: Any) -> None:
-    """Keep an object until the process ends, whatever happens to the module that made it."""
+    """Keep an object until the process ends, even if the module that made it is unloaded."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
 
 

@@ -1,7 +1,7 @@
-"""Finds where the fields of MuJoCo's visualisation structs lie, and verifies it, as `offsets.py` does.
+"""Find the offsets of the fields of MuJoCo's visualisation structs, and verify them, as `offsets.py` does.
 
-The Python bindings do not tell where a scene or its geoms are, so MuJoCo's own functions fill structs in memory of
-ours, and what is read there is compared with what the bindings show of the same scene.
+The Python bindings do not show the addresses of a scene and its geoms. So MuJoCo's own functions fill structs in
+memory that is allocated here, and their contents are compared with the same scene in the bindings.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ _XML = """
 
 
 class Drawing(NamedTuple):
-    """What the head of a block says about drawing, as `block.DRAWING` lists it; `blank`: a geom as MuJoCo begins it."""
+    """The part of a block's head for drawing, as `block.DRAWING` lists them; blank: a geom as MuJoCo initialises it."""
 
     words: list[int]
     blank: bytes
@@ -79,7 +79,7 @@ def _fields(name: str) -> tuple[dict[str, int], int]:
 
 
 def _visual() -> dict[str, int]:
-    """Return the offsets in mjModel of what `block.DRAWING` names of its visual options."""
+    """Return the offsets in mjModel of the visual options that `block.DRAWING` names."""
     start, found = _fields("mjModel")[0]["vis"], {}
     sections = {field.name: field for field in structs()["mjVisual"].fields}
     for section, names in (
@@ -92,7 +92,7 @@ def _visual() -> dict[str, int]:
 
 
 def _struct(name: str, *, fill: int = 0) -> Any:
-    """Return memory for a struct, and some more, filled with one byte."""
+    """Return memory for a struct and some bytes behind it, filled with one value."""
     buffer = (ctypes.c_ubyte * (_fields(name)[1] + _SPARE))()
     ctypes.memset(buffer, fill, len(buffer))
     return buffer
@@ -118,7 +118,7 @@ def _verify_model(model: mujoco.MjModel, visual: dict[str, int]) -> None:
 
 
 def _verify_option() -> Any:
-    """Return memory with MuJoCo's default mjvOption, whose bytes are those that Python shows."""
+    """Return memory with MuJoCo's default mjvOption, verified against the bytes that Python shows."""
     at, size = _fields("mjvOption")
     shown, memory = mujoco.MjvOption(), _struct("mjvOption", fill=0xA5)
     library().mjv_defaultOption(memory)
@@ -129,14 +129,14 @@ def _verify_option() -> Any:
         if not same or array.__array_interface__["data"][0] != base + at[name]:
             raise refuse(f"mjvOption.{name} is not where its declaration puts it")
     if _int(ctypes.addressof(memory) + at["label"]) != shown.label or raw[size:] != b"\xa5" * _SPARE:
-        raise refuse("mjvOption is not what its declaration says")
+        raise refuse("mjvOption differs from its declaration")
     if np.asarray(shown.tendongroup).size != GROUPS:
-        raise refuse("it has another number of groups")
+        raise refuse("its number of groups differs")
     return memory
 
 
 def _verify_scene(model: mujoco.MjModel, option: Any) -> None:
-    """Have MuJoCo fill a scene in memory of ours, and find in it what Python shows of the same scene."""
+    """Let MuJoCo fill a scene in memory that is allocated here, and verify it against the same scene in Python."""
     lib, data, camera = library(), mujoco.MjData(model), _struct("mjvCamera")
     mujoco.mj_forward(model, data)
     at, size = _fields("mjvScene")
@@ -144,7 +144,7 @@ def _verify_scene(model: mujoco.MjModel, option: Any) -> None:
     start = ctypes.addressof(memory)
     lib.mjv_defaultScene(memory)
     if bytes(memory)[size:] != b"\xa5" * _SPARE or any(bytes(memory)[at["status"] : size]):
-        raise refuse("mjvScene has another size")
+        raise refuse("the size of mjvScene differs from its declaration")
     lib.mjv_defaultCamera(camera)
     lib.mjv_makeScene(model._address, memory, 7)
     try:
@@ -156,7 +156,7 @@ def _verify_scene(model: mujoco.MjModel, option: Any) -> None:
         )
         numbers = {"maxgeom": 7, "ngeom": shown.ngeom, "status": 0}
         if any(_int(start + at[name]) != value for name, value in numbers.items()) or shown.ngeom < 4:
-            raise refuse("mjvScene is not what its declaration says")
+            raise refuse("mjvScene differs from its declaration")
         _verify_geoms(ctypes.c_uint64.from_address(start + at["geoms"]).value, shown)
     finally:
         lib.mjv_freeScene(memory)
@@ -178,7 +178,7 @@ def _verify_geoms(first: int, shown: mujoco.MjvScene) -> None:
 
 
 def _find() -> Drawing:
-    """Return how to draw in the installed MuJoCo; `VersionError` where something cannot be verified."""
+    """Return the layout for drawing in the installed MuJoCo; `VersionError` if it cannot be verified."""
     try:
         geom, size = _fields("mjvGeom")
         scene, option, model = _fields("mjvScene")[0], _fields("mjvOption")[0], _fields("mjModel")[0]
@@ -189,7 +189,7 @@ def _find() -> Drawing:
         label = {f.name: f for f in structs()["mjvGeom"].fields}["label"]
         light = [geom[name] - geom["emission"] for name in ("specular", "shininess", "reflectance")]
         if ctypes.sizeof(c_type(label.type)) != LABEL or size % 4 or light != [4, 8, 12]:
-            raise refuse("mjvGeom is laid out in another way")
+            raise refuse("the layout of mjvGeom differs from its declaration")
     except (KeyError, AttributeError) as error:
         raise refuse(f"its visualisation structs differ ({error})") from None
     blank = (ctypes.c_ubyte * size)()
@@ -222,12 +222,12 @@ def _find() -> Drawing:
 
 
 _FULL = ctypes.create_string_buffer(_TEXT)
-ctypes.pythonapi.Py_IncRef(ctypes.py_object(_FULL))  # blocks point to it, whatever happens to this module
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(_FULL))  # blocks point to it, even after this module is unloaded
 
 
 @functools.cache
 def drawing() -> Drawing | None:
-    """Return how to draw in the installed MuJoCo, or None, with a warning, where it cannot be verified."""
+    """Return the layout for drawing in the installed MuJoCo; None, with a warning, if it cannot be verified."""
     try:
         return _find()
     except VersionError as error:

@@ -1,1 +1,1 @@
-"""Changes an MjSpec, and the model compiled from it, for `install`, and undoes these changes."""
+"""Change an MjSpec and its compiled model for `install`, and undo these changes."""

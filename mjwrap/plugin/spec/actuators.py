@@ -1,4 +1,4 @@
-"""Disables actuators of an MjSpec whose muscles act by wrenches, and enables them for another install."""
+"""Disable the actuators of an MjSpec whose muscles act by wrenches, and enable them again."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from mjwrap.muscles.laws import ActuatorForce
 
 
 def disable_actuators(spec: mujoco.MjSpec, model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> None:
-    """Clamp the forces of these muscles' actuators to zero, unless they pull along mjwrap's paths themselves.
+    """Limit the forces of these muscles' actuators to zero, unless the actuators pull along mjwrap's paths.
 
-    model: compiled from the spec; it shows the force limits as written.
+    model: compiled from the spec; gives the original force limits.
     """
     elements = {element.id: element for element in spec.actuators}
     for muscle in muscles:
@@ -21,7 +21,7 @@ def disable_actuators(spec: mujoco.MjSpec, model: mujoco.MjModel, muscles: list[
 
 
 def enable_actuator(spec: mujoco.MjSpec, name: str) -> None:
-    """Give an actuator that `disable_actuators` has disabled its force limits back."""
+    """Restore the force limits of an actuator that `disable_actuators` has disabled."""
     element = spec.actuator(name)
     if element is not None:
         marks.enable_element(element)

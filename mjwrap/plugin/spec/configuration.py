@@ -1,6 +1,6 @@
-"""Writes and reads what an instance of the plugin is to do: its configuration, which is part of the model itself.
+"""Write and read the configuration of an instance of the plugin, which is stored in the model.
 
-Names of muscles stand there without the prefixes that `attach` adds; the instance's own name has those.
+It has the names of muscles without the prefixes that `attach` adds; the instance's own name has these prefixes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MODES = (WRENCH, TRANSMISSION)
 
 
 class Configuration(NamedTuple):
-    """Names of the muscles that an instance drives, how many numbers of plugin_state it has, and its mode."""
+    """The names of an instance's muscles, its number of entries of plugin_state, and its mode."""
 
     muscles: list[str]
     numbers: int
@@ -30,17 +30,17 @@ class Configuration(NamedTuple):
 
 
 def configuration_texts(muscles: list[str], numbers: int, mode: str) -> dict[str, str]:
-    """Return a configuration as MuJoCo keeps it; names are quoted as in URLs, so that a space separates them."""
+    """Return a configuration as MuJoCo stores it; names are quoted as in URLs and separated by spaces."""
     names = " ".join(quote(name, safe="/") for name in muscles)
     return {MUSCLES: names, NUMBERS: str(numbers), MODE: mode}
 
 
 def parse_configuration(name: str, texts: Mapping[str, str]) -> Configuration:
-    """Return the configuration of an instance from its name and texts; `ModelError` where mjwrap did not write it."""
+    """Return the configuration of an instance from its name and texts; `ModelError` if mjwrap did not write it."""
     muscles, numbers, mode = (texts.get(key, "") for key in ATTRIBUTES)
     if not is_own_instance(name) or not numbers.isdigit() or mode not in MODES:
         raise ModelError(
-            f"plugin instance '{name}' was not made by mjwrap.install; leave it out and call install on the MjSpec"
+            f"plugin instance '{name}' was not made by mjwrap.install; remove it and call install on the MjSpec"
         )
     prefix = name.removesuffix(PLUGIN_INSTANCE)
     return Configuration([prefix + unquote(part) for part in muscles.split()], int(numbers), mode)
@@ -60,5 +60,5 @@ def configuration_at(model: int, instance: int) -> Configuration:
 
 
 def spec_instances(spec: mujoco.MjSpec) -> list[mujoco.MjsPlugin]:
-    """Return the instances of mjwrap's plugin in an MjSpec, those of attached models among them."""
+    """Return the instances of mjwrap's plugin in an MjSpec, including those of attached models."""
     return [element for element in spec.plugins if element.plugin_name == PLUGIN_NAME]

@@ -1,4 +1,4 @@
-"""Adds the plugin's instance to an MjSpec, and keeps the bodies awake that its muscles pull."""
+"""Add the plugin's instance to an MjSpec, and keep the bodies awake that its muscles pull."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from mjwrap.plugin.spec.configuration import spec_instances
 
 
 def add_instance(spec: mujoco.MjSpec, texts: dict[str, str]) -> None:
-    """Add the instance with its configuration, or give the one that is there its new configuration.
+    """Add the instance with its configuration, or change the configuration of the existing instance.
 
-    MuJoCo's `attach` keeps only instances that an element names, so a body does: the first one without a plugin.
+    MuJoCo's `attach` keeps only instances that an element refers to; the first body without a plugin does so.
     """
     for element in spec_instances(spec):
         if element.name == PLUGIN_INSTANCE:
@@ -28,7 +28,7 @@ def add_instance(spec: mujoco.MjSpec, texts: dict[str, str]) -> None:
 
 
 def prevent_sleep(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: NDArray[np.int64]) -> None:
-    """Let no tree sleep that a muscle pulls, unless its sleep policy is given: as MuJoCo does for its own actuators."""
+    """Prevent trees that a muscle pulls from sleeping, unless they have a policy, as MuJoCo does for its actuators."""
     trees = {int(tree) for tree in model.body_treeid[bodies] if tree >= 0}
     for element in spec.bodies[1:]:
         tree, above = (int(model.body_treeid[b]) for b in (element.id, element.parent.id))

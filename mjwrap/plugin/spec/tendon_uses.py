@@ -1,4 +1,4 @@
-"""Tells which tendons MuJoCo needs besides the muscles that mjwrap drives, and which can show mjwrap's paths."""
+"""Find the tendons that MuJoCo itself needs, and those that can show mjwrap's paths."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
 _SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
 _POSITION = int(mujoco.mjtStage.mjSTAGE_POS)
 _FORCES = (int(mujoco.mjtSensor.mjSENS_FORCE), int(mujoco.mjtSensor.mjSENS_TORQUE))
-# fields of a tendon and of an actuator, each zero where it does nothing but pass the actuator's force on
+# fields of a tendon and of an actuator that are all zero if it only transmits the actuator's force
 _TENDON_ACTS = (
     "tendon_limited", "tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly",
     "tendon_armature", "tendon_frictionloss",
@@ -35,7 +35,7 @@ def _pulling(model: mujoco.MjModel, tendon: int) -> list[int]:
 
 
 def _is_used(model: mujoco.MjModel, tendon: int) -> bool:
-    """Return whether MuJoCo makes forces of a tendon: by limit, spring, damper, friction, inertia or equality."""
+    """Return whether a tendon makes forces of its own: by limit, spring, damper, friction, inertia or equality."""
     ties = model.eq_type == int(mujoco.mjtEq.mjEQ_TENDON)
     return (
         _acts(model, _TENDON_ACTS, tendon)
@@ -45,7 +45,7 @@ def _is_used(model: mujoco.MjModel, tendon: int) -> bool:
 
 
 def shown_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> set[int]:
-    """Return the tendons that can show mjwrap's path: all that pulls them does so along the same one, and no more."""
+    """Return the tendons that can show mjwrap's path: all their actuators pull along it, and they do nothing else."""
     paths: dict[int, set[Any]] = {}
     for muscle in muscles:
         if isinstance(muscle.parameters, ActuatorForce):
@@ -59,7 +59,7 @@ def shown_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> se
 
 
 def is_measured_late(model: mujoco.MjModel, sensor: int) -> bool:
-    """Return whether a sensor shows what it measured before, or at intervals, rather than what it measures."""
+    """Return whether a sensor shows delayed values, or values at intervals."""
     late = model.sensor_delay[sensor], model.sensor_interval[sensor], model.sensor_history[sensor]
     return any(bool(np.any(value)) for value in late)
 
@@ -71,9 +71,9 @@ def _is_scaled(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def _is_measured(model: mujoco.MjModel, kind: int, item: int, transmitted: bool) -> bool:
-    """Return whether a sensor needs a tendon's, or an actuator's, length along MuJoCo's own path.
+    """Return whether a sensor needs the length of a tendon or actuator along MuJoCo's own path.
 
-    transmitted: it shows mjwrap's, but for lengths that MuJoCo takes down before mjwrap has computed them.
+    transmitted: the sensor shows mjwrap's path, except for lengths that MuJoCo stores before mjwrap computes them.
     """
     measured = (model.sensor_objtype == kind) & (model.sensor_objid == item)
     measured |= (model.sensor_reftype == kind) & (model.sensor_refid == item)
@@ -86,7 +86,7 @@ def _is_measured(model: mujoco.MjModel, kind: int, item: int, transmitted: bool)
 def is_needed(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown: set[int]) -> bool:
     """Return whether MuJoCo needs a tendon's path: for forces, sensors, or an actuator that is not taken over.
 
-    taken: by actuator that is taken over, whether it pulls along mjwrap's path (else it is disabled). shown: tendons
+    taken: for each actuator taken over, whether it pulls along mjwrap's path (else it is disabled). shown: tendons
     that show mjwrap's path.
     """
     if _is_used(model, tendon) or int(model.wrap_type[model.tendon_adr[tendon]]) != _SITE:
@@ -97,7 +97,7 @@ def is_needed(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown:
     if model.tendon_actfrclimited[tendon] and not all(taken[actuator] for actuator in pulling):
         return True
     if np.isin(model.sensor_type, _FORCES).any() and any(taken[actuator] for actuator in pulling):
-        return True  # MuJoCo lets them feel its actuators where its own tendons pull
+        return True  # these sensors feel MuJoCo's actuators along MuJoCo's tendons
     if any(taken[actuator] and _is_scaled(model, actuator) for actuator in pulling):
         return True
     return _is_measured(model, _TENDON, tendon, tendon in shown) or any(

@@ -1,13 +1,13 @@
-"""Takes tendons that only say where a muscle runs out of MuJoCo's computation, hides them, and restores them.
+"""Remove, hide and restore tendons that only declare the route of a muscle.
 
-MuJoCo would spend up to half of its step on them. A tendon without stops has no length, no Jacobian and no cost. Where
-all that pulls it is disabled, the muscle curves of its actuators need not be computed either; their activations go on.
-This is done in the model that `install` returns only.
+MuJoCo would spend up to half of its step on them. A tendon without stops has no length, no Jacobian and no cost. If all
+its actuators are disabled, their muscle curves need not be computed either; their activations still are. Tendons are
+removed only in the model that `install` returns.
 
-A tendon that stays would be shown beside the path that the plugin draws. So it is made too thin to be seen: in the
+A tendon that stays would be shown together with the path that the plugin draws. So it is made invisibly thin, in the
 MjSpec, so that models compiled from it later, alone or attached, do not show it either.
 
-How each change is marked, so that a copy of the model can be read as it was: `mjwrap/mjcf/marks.py`.
+`mjwrap/mjcf/marks.py` describes the marks of these changes, with which the original model can be read from a copy.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MUSCLE_DYNAMICS = int(mujoco.mjtDyn.mjDYN_MUSCLE)
 
 
 def remove_unneeded_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> None:
-    """Take the stops from the tendons of these muscles that nothing else needs, and the curves from their actuators."""
+    """Remove the stops of tendons that only these muscles need, and the muscle curves of their actuators."""
     taken = {m.actuator: isinstance(m.parameters, ActuatorForce) for m in muscles if m.actuator >= 0}
     shown = shown_tendons(model, muscles)
     for tendon in {muscle.tendon for muscle in muscles if muscle.tendon >= 0}:
@@ -38,7 +38,7 @@ def remove_unneeded_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclarati
 
 
 def restore_tendons(model: mujoco.MjModel) -> None:
-    """Give tendons their stops back, and their actuators the curves; disabled actuators stay disabled."""
+    """Restore the stops of tendons and the curves of their actuators; disabled actuators stay disabled."""
     for actuator in _muscles_without_stops(model):
         if marks.lacks_curves(model, actuator):
             marks.restore_curves(model, actuator)
@@ -58,7 +58,7 @@ def _muscles_without_stops(model: mujoco.MjModel) -> list[int]:
 
 
 def hide_tendons(spec: mujoco.MjSpec, muscles: list[MuscleDeclaration]) -> None:
-    """Make the tendons of these muscles invisible; a width set again later is shown, and drawn by the plugin too."""
+    """Make the tendons of these muscles invisible; if a width is set later, MuJoCo and the plugin both use it."""
     taken = {muscle.tendon for muscle in muscles}
     for tendon in spec.tendons:
         if tendon.id in taken:
@@ -66,7 +66,7 @@ def hide_tendons(spec: mujoco.MjSpec, muscles: list[MuscleDeclaration]) -> None:
 
 
 def show_tendon(spec: mujoco.MjSpec, actuator: str) -> None:
-    """Give the tendon that an actuator pulls the width back that `hide_tendons` has taken from it."""
+    """Restore the width, which `hide_tendons` has changed, of the tendon that an actuator pulls."""
     element = spec.actuator(actuator)
     tendon = spec.tendon(element.target) if element is not None else None
     if tendon is not None:

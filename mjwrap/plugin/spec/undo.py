@@ -1,4 +1,4 @@
-"""Gives an MjSpec back what `install` has changed in it, where `install` fails."""
+"""Undo the changes of `install` in an MjSpec if `install` fails."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _CLAMP = ("forcelimited", "forcerange", "gainprm", "biasprm")
 
 @contextmanager
 def undone_on_error(spec: mujoco.MjSpec) -> Iterator[None]:
-    """Give a spec back what `install` changes in it where the block raises: clamps, widths, sleep, the instance.
+    """Undo the changes of `install` in a spec if the with block raises: force limits, widths, sleep, the instance.
 
-    That the plugin may be used stays, which MuJoCo has no call to take back and which means nothing by itself.
+    The plugin's activation stays: MuJoCo cannot undo it, and without an instance it has no effect.
     """
     actuators = [(each, [_kept(getattr(each, name)) for name in _CLAMP]) for each in spec.actuators]
     widths = [(each, each.width) for each in spec.tendons]
@@ -44,6 +44,6 @@ def undone_on_error(spec: mujoco.MjSpec) -> Iterator[None]:
 
 
 def _kept(value: object) -> object:
-    """Return a value that stays as it is: arrays of a spec show what is set later."""
+    """Return a copy of a value: arrays of a spec would show later changes."""
     copy = getattr(value, "copy", None)
     return copy() if callable(copy) else value

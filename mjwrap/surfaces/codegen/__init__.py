@@ -1,4 +1,4 @@
-"""Surfaces from plain Python functions: their source, derivatives, checks, machine code and its place on the disk.
+"""Compile surfaces from plain Python functions: source, derivatives, checks, machine code and its cache.
 
     build -> source, generate (-> symbols, specialise, extrapolation, lanes, templates), implicit | parametric, library
 

@@ -1,4 +1,4 @@
-"""From a user's functions to a compiled module: captured, derived, looked at, written, loaded, and compared."""
+"""Make a compiled module from a user's functions: read, derive, check, write, load and compare them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from mjwrap.surfaces.codegen import generate, implicit, library, parametric
 from mjwrap.surfaces.codegen.differences import Array
 from mjwrap.surfaces.codegen.source import Source
 
-_SAME = 1e-9  # by how much of a surface's size compiled code may differ from Python
+_SAME = 1e-9  # largest difference of compiled code from Python, relative to the surface's size
 _COMPARED = 10  # points
 
 
 class Made(NamedTuple):
     """A compiled surface: its functions `geodesic`, `project`, `height` and constants are the module's."""
 
-    label: str  # its class and name, for messages
+    label: str  # class and name of the surface, for messages
     key: str
     module: ModuleType
 
@@ -66,7 +66,7 @@ def parametric_module(
 
 
 def remade(label: str, key: str, generator: str, text: str) -> Made:
-    """Return a surface from the text of its module, as another process made it with this version."""
+    """Return a surface from the text of its module, which another process with this version has made."""
     if generator != library.generator_hash():
         raise GeometryError(
             f"{label} was made by another version of mjwrap; make it again from its functions"
@@ -76,7 +76,7 @@ def remade(label: str, key: str, generator: str, text: str) -> Made:
 
 @contextlib.contextmanager
 def _labelled(label: str) -> Iterator[None]:
-    """Put the surface's name in front of messages."""
+    """Add the surface's name to messages."""
     try:
         yield
     except GeometryError as error:
@@ -84,7 +84,7 @@ def _labelled(label: str) -> Iterator[None]:
 
 
 def _loaded(key: str, make: Callable[[], str], label: str) -> ModuleType:
-    """Load a module; where it was made now, compare it with the same functions in plain Python."""
+    """Load a module; if it has just been made, compare it with the same functions in plain Python."""
     texts: list[str] = []
 
     def make_and_keep() -> str:
@@ -105,7 +105,7 @@ def _loaded(key: str, make: Callable[[], str], label: str) -> ModuleType:
 
 
 def _compare(module: ModuleType) -> None:
-    """Raise `GeometryError` where machine code finds other points than Python, as too large whole numbers would."""
+    """Raise `GeometryError` if machine code finds other points than Python, as with too large whole numbers."""
     python = generate.plain(generate.without_imports(module.TEXT))
     compiled = ctypes.CFUNCTYPE(None, *[ctypes.c_double] * 3, ctypes.POINTER(ctypes.c_double))(
         module.project.address
@@ -121,6 +121,6 @@ def _compare(module: ModuleType) -> None:
         ):
             library.forget(module.__name__, Path(str(module.__file__)))
             raise GeometryError(
-                f"compiled, it gives other numbers: the point nearest to {sample.tolist()} is {out[:3]}, in Python "
-                f"{expected[:3]}. Whole numbers have 64 bits there: write 2.0 for 2 where they grow large"
+                f"compiled, it gives different numbers: the point nearest to {sample.tolist()} is {out[:3]}, in Python "
+                f"{expected[:3]}. Compiled whole numbers have 64 bits: write 2.0 instead of 2 if they become large"
             )

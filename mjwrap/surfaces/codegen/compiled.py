@@ -1,6 +1,6 @@
-"""How the functions of a generated module are compiled: the same arithmetic as the kernels', callable from C.
+"""Compile the functions of a generated module, with the same arithmetic as the kernels, callable from C.
 
-With NUMBA_DISABLE_JIT=1 they stay Python and are given a C address all the same.
+With NUMBA_DISABLE_JIT=1 they stay Python functions, but still get a C address.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _C_REAL, _C_POINTER = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
 
 
 class _Uncompiled:
-    """A Python function with a C address; what it raises becomes NaN, as in compiled code."""
+    """A Python function with a C address; an exception becomes NaN, as in compiled code."""
 
     cache_hits = 0
 
@@ -39,7 +39,7 @@ class _Uncompiled:
 
 
 def _entry(returns: Any, arguments: list[Any], c_returns: Any, c_arguments: list[Any], size: int) -> Any:
-    """Return a decorator that gives a function a C address; size: of the array that it fills."""
+    """Return a decorator that gives a function a C address; size: size of the array that it fills."""
     if config.DISABLE_JIT:
         return lambda function: _Uncompiled(function, c_returns, c_arguments, size)
     return numba.cfunc(returns(*arguments), cache=True, **_OPTIONS)

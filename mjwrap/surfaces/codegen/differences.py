@@ -1,4 +1,4 @@
-"""Derivatives checked against differences, where a surface is made."""
+"""Check a surface's derivatives against differences, when the surface is made."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from mjwrap.errors import GeometryError
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
-TOLERANCE = 1e-5  # of a derivative, relative to the largest of its kind at the same point
-ROUNDING = 1e-8  # of the value itself, over the length that the caller names
-_STEP = 1e-4  # of the differences, as a share of the step that the caller names
+TOLERANCE = 1e-5  # error of a derivative, relative to the largest of its kind at the same point
+ROUNDING = 1e-8  # error of the value itself, over the length that the caller gives
+_STEP = 1e-4  # step of the differences, relative to the step that the caller gives
 
 
 def check(
     value: Function, derivative: Function, places: Sequence[Array], steps: Sequence[float], names: list[str]
 ) -> None:
-    """Raise `GeometryError` where a derivative is not what fourth-order differences of the value say.
+    """Raise `GeometryError` if a derivative differs from fourth-order differences of the value.
 
-    value (m,) and derivative (n, m): of a place (n,), derived by each of its n arguments; steps (n,): lengths over
-    which the value changes; names (n * m): of the derivative's numbers, row by row.
+    value (m,), derivative (n, m): functions of a place (n,), the latter by each of the n arguments; steps (n,): lengths
+    over which the value changes; names (n * m): names of the derivative's numbers, row by row.
     """
     for place in places:
         given = derivative(place)
@@ -34,8 +34,8 @@ def check(
             i = int(np.argmax((wrong | ~np.isfinite(given)).ravel()))
             at = ", ".join(f"{number:.6g}" for number in place)
             raise GeometryError(
-                f"{names[i]} is {given.ravel()[i]:.9g} at ({at}), and differences say {expected.ravel()[i]:.9g}: "
-                "a wrong derivative, or the surface is not smooth there"
+                f"{names[i]} is {given.ravel()[i]:.9g} at ({at}), but differences give {expected.ravel()[i]:.9g}: "
+                "the derivative is wrong, or the surface is not smooth there"
             )
 
 

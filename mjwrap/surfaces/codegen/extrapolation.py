@@ -1,10 +1,10 @@
-"""One long step along a geodesic, written out for a surface's own equations: Gragg's midpoint rule, extrapolated.
+"""Generate the code of one long step along a geodesic of a given surface: Gragg's midpoint rule with extrapolation.
 
-A step is done eight times over, with 2, 4, ..., 16 substeps; the errors have even powers of the substep only, so that
-fixed weights on the eight results leave an error of order 17 (Hairer, Norsett, Wanner, Solving Ordinary Differential
-Equations I, II.9). The eight columns are independent and fill the lanes of the vector unit, as those of Stoermer's rule
-in the kernels. The midpoint rule takes what that one does not: forces that depend on the direction of travel, as a
-general surface's do.
+A step is computed eight times, with 2, 4, ..., 16 substeps. The errors contain only even powers of the substep, so that
+a sum of the eight results with fixed weights has an error of order 17 (Hairer, Norsett, Wanner, Solving Ordinary
+Differential Equations I, II.9). The eight columns are independent and fill the lanes of the vector unit, as with
+Stoermer's rule in the kernels. Unlike that rule, the midpoint rule allows forces that depend on the velocity, as those
+of a general surface do.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ Pairs = Sequence[tuple[str, str]]
 
 
 def step_text(pairs: Pairs, field: ast.FunctionDef) -> str:
-    """Return the text of `step`, which carries a geodesic and its Jacobi fields over an arc h.
+    """Return the text of `step`, which continues a geodesic and its Jacobi fields over an arc h.
 
     pairs: names of coordinates and their rates, such as ("x", "tx"). field: a function of all coordinates, then all
-    rates, that ends by returning their second derivatives and the Gaussian curvature; its text goes into the loops.
+    rates, that ends by returning their second derivatives and the Gaussian curvature; its text is put into the loops.
     """
     every = [*pairs, ("a", "da"), ("r", "dr")]
     state = [name for pair in every for name in pair]
@@ -68,7 +68,7 @@ def step({", ".join([*state, "h", *lengths])}):
 
 
 def _body(field: ast.FunctionDef, forces: list[str]) -> str:
-    """Return the statements that compute the rates' rates, under these names."""
+    """Return the statements that compute the second derivatives, under these names."""
     *statements, last = field.body
     assert isinstance(last, ast.Return)
     assert isinstance(last.value, ast.Tuple)

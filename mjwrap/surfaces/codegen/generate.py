@@ -1,4 +1,4 @@
-"""Module texts: a user's functions and their derivatives in front, one of `kernels` behind."""
+"""Generate the text of a module: a user's functions and their derivatives, then one of `templates`."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ Derived = dict[str, tuple[str, Lines]]
 
 
 class Core:
-    """A surface's own functions: their text, which of them were derived, and the same functions in plain Python."""
+    """The functions of a surface: their text, which of them were derived, and the same functions in plain Python."""
 
     def __init__(self, source: Source, written: str, derived: Derived, values: dict[str, str]) -> None:
-        """written: text beside the source's; values: for each derived function what it returns."""
+        """written: text in addition to the source's; values: the values that each derived function returns."""
         self.derived = derived
         definitions = [f"@inner\n{text}" for text in source.texts] + ([written] if written else [])
         for name, (arguments, lines) in derived.items():
@@ -50,7 +50,7 @@ class Core:
 
 
 def plain(text: str) -> SimpleNamespace:
-    """Run a piece of a generated module without compiling it; return what it defines."""
+    """Run a piece of a generated module without compiling it; return its definitions."""
     names: dict[str, Any] = {
         "math": math,
         "np": np,
@@ -65,12 +65,12 @@ def plain(text: str) -> SimpleNamespace:
 
 
 def without_imports(text: str) -> str:
-    """Return the text of a module without what ties it to compiled code, for `plain`."""
+    """Return the text of a module without the imports of compiled code, for `plain`."""
     return "\n".join(line for line in text.splitlines() if not line.startswith(("import ", "from ")))
 
 
 def implicit_core(source: Source, phi: str, gradient: str | None, hessian: str | None) -> Core:
-    """Return `value` and `second` for phi, whose names in the source's text are given; derive what is not there."""
+    """Return `value` and `second` for phi; phi, gradient, hessian: names in the source's text, None to derive."""
     second_values = ", ".join([*_GRADIENT, *_HESSIAN])
     values = {"value": "phi, gx, gy, gz", "second": second_values}
     if gradient is None:
@@ -103,7 +103,7 @@ def second(x, y, z):
 
 
 def parametric_core(source: Source, r: str, derivatives: str | None) -> Core:
-    """Return `chart` for r, whose name in the source's text is given; derive what is not there."""
+    """Return `chart` for r; r, derivatives: names in the source's text, None to derive."""
     names = [f"{axis}{by}" for by in _CHART for axis in "xyz"]
     if derivatives is None:
         wanted = {name: ("xyz".index(name[0]), name[1:]) for name in names}
@@ -120,7 +120,7 @@ def chart(u, v):
 
 
 def module_text(kind: str, core: Core, constants: dict[str, Any]) -> str:
-    """Return the text of a module: kind is "implicit" or "parametric", constants: what its fixed part asks for."""
+    """Return the text of a module; kind: "implicit" or "parametric", constants: those that the template needs."""
     fixed = (_FIXED / f"{kind}.py").read_text(encoding="utf-8").split(_MARK)[1]
     fixed = specialise(fixed, core.derived)
     pairs = [("u", "du"), ("v", "dv")] if kind == "parametric" else [("x", "tx"), ("y", "ty"), ("z", "tz")]

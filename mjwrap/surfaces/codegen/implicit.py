@@ -1,4 +1,4 @@
-"""What a surface phi(x, y, z) = 0 has to be before it is compiled, and what its module has to know of it."""
+"""Check a surface phi(x, y, z) = 0 before it is compiled, and find the constants of its module."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from mjwrap.surfaces.codegen.generate import Core
 from mjwrap.surfaces.codegen.source import call
 
 _GRID = 24  # points along each edge of the box
-_SAMPLES = 120  # points of the surface that are kept
-_CHECKED = 12  # of them have their derivatives checked
-_FLATTEST = 1e-9  # smallest gradient, as a share of the largest
+_SAMPLES = 120  # number of points of the surface that are kept
+_CHECKED = 12  # number of these points at which derivatives are checked
+_FLATTEST = 1e-9  # smallest gradient, relative to the largest
 
 
 def constants(
     core: Core, phi: Callable[..., Any], extent: tuple[float, ...], size: float | None
 ) -> dict[str, Any]:
-    """Look at a surface within a box about the origin; return what its module has to know of it.
+    """Check a surface within a box about the origin; return the constants of its module.
 
-    phi: the user's function; extent (3,): half widths of the box [m]; size: or None to have it found [m].
-    `GeometryError` where it is no smooth surface.
+    phi: the user's function; extent (3,): half widths of the box [m]; size [m]: None to find it.
+    Raises `GeometryError` if the surface is not smooth.
     """
     box = np.array(extent)
     grid, values = _grid_values(phi, box)
@@ -78,19 +78,19 @@ def _grid_values(phi: Callable[..., Any], box: Array) -> tuple[Array, Array]:
 
 
 def _reach(grid: Array, values: Array) -> float:
-    """Return the radius of a sphere about the origin that holds the surface; infinite where it leaves the box."""
+    """Return the radius of a sphere about the origin that contains the surface; infinite if it leaves the box."""
     inside = values < 0.0
     if any(np.take(inside, end, axis).any() for axis in range(3) for end in (0, -1)):
         return math.inf
     for axis in range(
         3
-    ):  # points beside those inside, so that what bulges between points of the grid is held too
+    ):  # neighbours of the inside points, so that bulges between points of the grid are contained too
         inside = inside | np.roll(inside, 1, axis) | np.roll(inside, -1, axis)
     return float(np.linalg.norm(grid[inside], axis=-1).max())
 
 
 def _sign_changes(grid: Array, values: Array, box: Array) -> Array:
-    """Return points (n, 3) near the surface, between neighbours on a grid where phi changes its sign."""
+    """Return points (n, 3) near the surface, between neighbouring grid points at which phi has different signs."""
     found = []
     for direction in range(3):
         low, high = (np.take(values, range(i, _GRID - 1 + i), direction) for i in (0, 1))
@@ -102,14 +102,14 @@ def _sign_changes(grid: Array, values: Array, box: Array) -> Array:
     if len(points) == 0:
         sign = "negative" if values[0, 0, 0] < 0.0 else "positive"
         raise GeometryError(
-            f"phi is {sign} all over the box of half widths {_words(box)} [m]: there is no surface in it. phi must be "
-            "negative inside and positive outside; choose `extent` so that the box holds the surface, hardly more"
+            f"phi is {sign} in the whole box of half widths {_words(box)} [m]: it contains no surface. phi must be "
+            "negative inside and positive outside; choose `extent` so that the box just contains the surface"
         )
     return points
 
 
 def _spread(points: Array, count: int) -> Array:
-    """Return so many of the points (n, 3), each as far from the others as may be."""
+    """Return `count` of the points (n, 3), as far from each other as possible."""
     chosen = [0]
     distance = np.linalg.norm(points - points[0], axis=1)
     while len(chosen) < min(count, len(points)):
@@ -119,7 +119,7 @@ def _spread(points: Array, count: int) -> Array:
 
 
 def _on_surface(core: Core, points: Array, box: Array) -> Array:
-    """Return the points of the surface (n, 3) that Newton's method along the gradient finds from these."""
+    """Return the points of the surface (n, 3) that Newton's method along the gradient finds from the given points."""
     found = []
     for point in points:
         p = point
@@ -135,14 +135,14 @@ def _on_surface(core: Core, points: Array, box: Array) -> Array:
                 break
     if len(found) < 0.5 * len(points):
         raise GeometryError(
-            "phi: from most points near the surface its gradient does not lead onto it; phi must be smooth, "
+            "phi: from most points near the surface, steps along the gradient do not reach it; phi must be smooth, "
             "with a gradient that does not vanish there"
         )
     return np.array(found)
 
 
 def _smallest_radius(core: Core, p: Array, normal: Array) -> float:
-    """Return the smallest radius of curvature at a point of the surface; 0 where it is not finite."""
+    """Return the smallest radius of curvature at a point of the surface; 0 if it is not finite."""
     tangent = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     tangent /= np.linalg.norm(tangent)
     gx, gy, gz, xx, yy, zz, xy, xz, yz = _second(core, p)
@@ -160,7 +160,7 @@ def _second(core: Core, p: Array) -> Array:
 
 
 def _check_derivatives(core: Core, phi: Callable[..., Any], places: Array, size: float) -> None:
-    """Raise `GeometryError` where gradient or Hessian are not what differences of phi and of the gradient say."""
+    """Raise `GeometryError` if gradient or Hessian differ from differences of phi and of the gradient."""
 
     def gradient(p: Array) -> Array:
         return np.array(core.python.value(*p.tolist())[1:])

@@ -1,4 +1,4 @@
-"""What generated modules share: room and weights for eight columns side by side, and sines that fill vector lanes."""
+"""Shared parts of generated modules: memory and weights for eight columns, and sines that fill vector lanes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mjwrap.surfaces.codegen.compiled import inner
 
 __all__ = ["ERROR_WEIGHT", "HALF", "LANES", "WEIGHT", "combine", "cosine", "sine", "stack"]
 
-HALF = 0.5 * INVERSE  # of a step: a substep of each column
+HALF = 0.5 * INVERSE  # substeps of each column, as shares of a step
 _ROOM = 21 * LANES  # doubles: the ten numbers of a geodesic twice for each column, and its substep
 
 
@@ -24,11 +24,11 @@ def _memory() -> Any:
 
 
 def _memory_on_stack(typing_context: Any) -> Any:
-    """Return a pointer to room for all columns on the caller's stack."""
+    """Return a pointer to memory for all columns on the caller's stack."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        room = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), _ROOM))
-        return builder.bitcast(room, ir.DoubleType().as_pointer())
+        memory = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), _ROOM))
+        return builder.bitcast(memory, ir.DoubleType().as_pointer())
 
     return types.CPointer(types.float64)(), generate
 
@@ -46,7 +46,7 @@ def combine(v: Any, row: int, weight: Any) -> float:
 
 
 # ------------------------------------------------------------------------------------- sine and cosine
-# Those of the C library are calls, which keep a loop from filling the lanes. Reduction by pi/2 in three parts and the
+# The C library's functions are calls, which prevent vectorised loops. Reduction by pi/2 in three parts and the
 # polynomials of fdlibm (Sun Microsystems 1993, k_sin.c, k_cos.c): exact to an ulp or two for |x| < 1e6.
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: added and taken off again, it rounds to a whole number
@@ -56,7 +56,7 @@ _PI_1, _PI_2, _PI_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959
 
 @inner
 def _quadrant(x: float) -> tuple[float, float]:
-    """Return the nearest multiple of pi/2 to x, and x less that."""
+    """Return the nearest multiple of pi/2 to x, and the remainder."""
     n = (x * _PER_TURN + _ROUND) - _ROUND
     return n, ((x - n * _PI_1) - n * _PI_2) - n * _PI_3
 

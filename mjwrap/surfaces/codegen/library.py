@@ -1,7 +1,7 @@
-"""Where generated modules are kept, and how they are loaded: written once, compiled once, found again by their content.
+"""Store and load generated modules: each is written and compiled once, and found again by its content.
 
-A module's name is a hash of all that it is made from, and its folder is named by the sources that it imports, so that
-nothing is ever out of date. Files are written in one go: processes that write one at the same time write the same.
+A module's name is a hash of everything from which it is made, and its folder is named by the sources that it imports.
+So no module can be outdated. Files are written in one step; processes that write the same file write the same text.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mjwrap.kernels.compilation import cache_folders, module_caches
 
 PREFIX = "mjwrap_surface_"
 _IMPORTED = (
-    "mjwrap.surfaces.codegen.lanes"  # by every module that is made; it reaches all that they import of mjwrap
+    "mjwrap.surfaces.codegen.lanes"  # every generated module imports it, and through it all else of mjwrap
 )
 _HERE = Path(__file__).parent
 _NOTICE = "mjwrap: compiling the surface {}, once for this machine and version (some seconds) ..."
@@ -37,7 +37,7 @@ _LOCK = threading.RLock()
 
 @cache
 def generator_hash() -> str:
-    """Return a hash over the sources of this package, which write the modules."""
+    """Return a hash of the sources of this package, which generates the modules."""
     digest = hashlib.sha256()
     for file in sorted(_HERE.rglob("*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
@@ -45,12 +45,12 @@ def generator_hash() -> str:
 
 
 def key_of(*parts: object) -> str:
-    """Return 16 hexadecimal digits that change with anything that a module is made from."""
+    """Return 16 hexadecimal digits: a hash of everything from which a module is made."""
     return hashlib.sha256("\0".join([generator_hash(), *map(repr, parts)]).encode()).hexdigest()[:16]
 
 
 def load(key: str, make: Callable[[], str], label: str) -> ModuleType:
-    """Return the compiled module of a key, from this process, the disk, or `make`; label: for the user."""
+    """Return the compiled module of a key, from this process, from disk, or from `make`; label: for messages."""
     name = PREFIX + key
     with _LOCK:
         if name in sys.modules:
@@ -62,26 +62,26 @@ def load(key: str, make: Callable[[], str], label: str) -> ModuleType:
             except GeometryError:
                 raise
             except Exception:
-                pass  # a damaged file: made anew
+                pass  # a damaged file: make the module again
         _write(path, make())
         return _import(name, path, label)
 
 
 @cache
 def folder() -> Path:
-    """Return where modules are kept that import these sources."""
+    """Return the folder of the modules that import these sources."""
     return module_caches.new_place(_IMPORTED, "mjwrap.surfaces").folder
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file in one go."""
+    """Write a file in one step."""
     cache_folders.make_version(path.parent)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(text)
     try:
         os.replace(name, path)
-    except OSError:  # where files in use cannot be replaced, another process has just put the same one there
+    except OSError:  # if files in use cannot be replaced, another process has just written the same file
         os.unlink(name)
         if not path.is_file():
             raise
@@ -93,7 +93,7 @@ def _import(name: str, path: Path, label: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # for good: rows of paths hold addresses of its machine code
+    sys.modules[name] = module  # never removed: rows of paths contain addresses of its machine code
     try:
         module_caches.keep(name, path)
         with (
@@ -113,14 +113,14 @@ def _import(name: str, path: Path, label: str) -> ModuleType:
 
 
 def forget(name: str, path: Path) -> None:
-    """Drop a module that turned out not to be usable, from this process and from the disk."""
+    """Remove an unusable module from this process and from disk."""
     sys.modules.pop(name, None)
     with contextlib.suppress(OSError):
         path.unlink()
 
 
 class _Announcer(event.Listener):
-    """Tells the user that a surface is being compiled rather than loaded."""
+    """Tell the user that a surface is being compiled, not loaded."""
 
     def __init__(self, module: str, label: str) -> None:
         self.module, self.label, self.silent = module, label, False

@@ -1,4 +1,4 @@
-"""What a surface r(u, v) has to be before it is compiled, and what its module has to know of it."""
+"""Check a surface r(u, v) before it is compiled, and find the constants of its module."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from mjwrap.surfaces.codegen.differences import Array, check
 from mjwrap.surfaces.codegen.generate import Core, module_text, plain, without_imports
 from mjwrap.surfaces.codegen.source import call
 
-_GRID = 33  # points along each range at which the surface is looked at
+_GRID = 33  # points along each range at which the surface is checked
 _CHECKED = 16  # places at which derivatives are checked
-_CLOSED = (
-    1e-9  # a range closes on itself where both ends are the same point to this share of the surface's extent
-)
-_NEARLY = 1e-2  # ... and was meant to where they are the same to this share
-_SINGULAR = 1e-4  # smallest |r_u x r_v|, as a share of the median
-_UNCLEAR = 0.05  # share of the surface that faces away from its middle, beyond which outside cannot be told from inside
-_RESOLUTIONS = (8, 12, 16, 24, 32, 48)  # of the samples from which a search starts
+_CLOSED = 1e-9  # a range is periodic if its ends differ by less than this share of the surface's extent
+_NEARLY = 1e-2  # ... and was probably meant to be periodic if they differ by less than this share
+_SINGULAR = 1e-4  # smallest |r_u x r_v|, relative to the median
+_UNCLEAR = 0.05  # if a larger share faces towards the surface's middle, the outer side is not known
+_RESOLUTIONS = (8, 12, 16, 24, 32, 48)  # numbers of samples from which a search starts
 _TRIALS = 40
 
 
 class Chart(NamedTuple):
-    """How a chart is bounded."""
+    """The bounds of a chart."""
 
     low: tuple[float, float]
     high: tuple[float, float]
@@ -36,9 +34,9 @@ class Chart(NamedTuple):
 
 
 def constants(core: Core, r: Callable[..., Any], chart: Chart, size: float | None) -> dict[str, Any]:
-    """Look at a surface over its ranges; return what its module has to know of it.
+    """Check a surface over its ranges; return the constants of its module.
 
-    r: the user's function; size: or None to have it found [m]. `GeometryError` where it is no smooth surface.
+    r: the user's function; size [m]: None to find it. Raises `GeometryError` if the surface is not smooth.
     """
     places = np.array([[_between(chart, i, j) for j in _shares()] for i in _shares()])  # (n, n, 2)
     points = np.array([[_point(r, place) for place in row] for row in places])
@@ -51,8 +49,8 @@ def constants(core: Core, r: Callable[..., Any], chart: Chart, size: float | Non
     if not area.min() > _SINGULAR * np.median(area):
         u, v = places[np.unravel_index(np.argmin(area), area.shape)]
         raise GeometryError(
-            f"r: r_u x r_v vanishes or is not finite at u = {u:.6g}, v = {v:.6g} (a pole of the chart?): narrow the "
-            "range so that it stays away from there, or give the surface as an ImplicitSurface"
+            f"r: r_u x r_v vanishes or is not finite at u = {u:.6g}, v = {v:.6g} (a pole of the chart?): choose a "
+            "range without this point, or give the surface as an ImplicitSurface"
         )
     extent = float(np.ptp(points.reshape(-1, 3), axis=0).max())
     periodic = tuple(_closes(points, values, axis, chart.periodic[axis], extent) for axis in (0, 1))
@@ -84,7 +82,7 @@ def _width(chart: Chart, axis: int) -> float:
 
 
 def _between(chart: Chart, i: float, j: float) -> tuple[float, float]:
-    """Return u and v at shares of their ranges; both ends are met exactly."""
+    """Return u and v at shares of their ranges; the ends are exact."""
     u, v = (
         (1.0 - share) * low + share * high
         for share, low, high in zip((i, j), chart.low, chart.high, strict=True)
@@ -107,7 +105,7 @@ def _point(r: Callable[..., Any], place: Array) -> list[float]:
 
 
 def _check_derivatives(core: Core, r: Callable[..., Any], chart: Chart) -> None:
-    """Raise `GeometryError` where a derivative is not what differences say."""
+    """Raise `GeometryError` if a derivative differs from differences."""
 
     def part(first: int, last: int) -> Callable[[Array], Array]:
         return lambda p: np.array(core.python.chart(*p.tolist()), dtype=float).reshape(6, 3)[first:last]
@@ -125,13 +123,13 @@ def _check_derivatives(core: Core, r: Callable[..., Any], chart: Chart) -> None:
 
 
 def scattered(chart: Chart, count: int) -> list[tuple[float, float]]:
-    """Return places that fill the ranges evenly without a grid (the additive recurrence of the plastic number)."""
+    """Return points that fill the ranges evenly without a grid (additive recurrence of the plastic number)."""
     root = 1.32471795724474602596
     return [_between(chart, (0.5 + k / root) % 1.0, (0.5 + k / root**2) % 1.0) for k in range(1, count + 1)]
 
 
 def _closes(points: Array, values: Array, axis: int, wanted: bool | None, extent: float) -> bool:
-    """Return whether a range closes on itself, smoothly; `GeometryError` where it does and does not."""
+    """Return whether a range is smoothly periodic; `GeometryError` if it is only nearly so, or not as `wanted`."""
     first, last = (np.take(points, i, axis) for i in (0, -1))
     gap = float(np.linalg.norm(first - last, axis=-1).max()) / extent
     rate = np.abs(np.take(values, 0, axis) - np.take(values, -1, axis)).max(axis=(0, 2))
@@ -140,7 +138,7 @@ def _closes(points: Array, values: Array, axis: int, wanted: bool | None, extent
     if wanted is None and _CLOSED < gap <= _NEARLY:
         raise GeometryError(
             f"r: the ends of {name}_range are nearly the same points ({gap:.2g} of the surface's extent apart). "
-            "Give the exact period, as in (0, math.tau), or say that it is open: periodic=..."
+            "Give the exact period, as in (0, math.tau), or declare the range open with periodic=..."
         )
     closed = gap <= _CLOSED and bool(smooth)
     if wanted and not closed:
@@ -151,7 +149,7 @@ def _closes(points: Array, values: Array, axis: int, wanted: bool | None, extent
 
 
 def _reach(points: Array) -> float:
-    """Return the radius of a sphere about the origin that holds a closed surface [m]."""
+    """Return the radius of a sphere about the origin that contains a closed surface [m]."""
     apart = max(float(np.linalg.norm(np.diff(points, axis=axis), axis=-1).max()) for axis in (0, 1))
     return float(np.linalg.norm(points, axis=-1).max()) + 0.5 * apart
 
@@ -163,8 +161,8 @@ def _outward(points: Array, normals: Array) -> int:
     share = float(facing.sum() / max(np.abs(facing).sum(), 1e-300))
     if abs(share) < _UNCLEAR:
         raise GeometryError(
-            "r: which side is outside cannot be told from the shape; give outward=1 where r_u x r_v points outward, "
-            "else -1"
+            "r: the outer side cannot be found from the shape; give outward=1 if r_u x r_v points outward, else "
+            "outward=-1"
         )
     return 1 if share > 0.0 else -1
 
@@ -183,7 +181,7 @@ def _smallest_radius(values: Array, normals: Array) -> float:
 def _samples(
     core: Core, r: Callable[..., Any], chart: Chart, found: dict[str, Any], lengths: list[float]
 ) -> dict[str, Any]:
-    """Return points from which a search of the nearest point starts, as few as do for points off the surface."""
+    """Return points from which the search of the nearest point starts, as few as are sufficient near the surface."""
     made: dict[str, Any] = {}
     for resolution in _RESOLUTIONS:
         ratio = min(max(math.sqrt(lengths[0] / lengths[1]), 0.25), 4.0)
@@ -205,7 +203,7 @@ def _samples(
 
 
 def _finds_all(module: SimpleNamespace, chart: Chart, size: float) -> bool:
-    """Return whether the nearest points of places beside the surface are found."""
+    """Return whether the search finds the nearest points of points near the surface."""
     out = [0.0] * 6
     for k, place in enumerate(scattered(chart, _TRIALS)):
         x, y, z, xu, yu, zu, xv, yv, zv, *_ = module.chart(*place)

@@ -1,7 +1,7 @@
-"""From a user's function to text that stands on its own: its source, its helpers' and the numbers that it uses.
+"""Convert a user's function to self-contained text, with its helper functions and the numbers that it uses.
 
-What a function finds outside itself is looked up once, when the surface is made: numbers become literals, helper
-functions are taken along, `math` stays. All else cannot become machine code and is a `GeometryError` that names it.
+Names from outside the function are looked up once, when the surface is made: numbers become literals, helper functions
+are included, `math` stays. Everything else cannot become machine code and raises a `GeometryError` that names it.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _WORDS = {
     ast.JoinedStr: "a string", ast.Global: "global", ast.Nonlocal: "nonlocal", ast.Starred: "*",
     ast.NamedExpr: ":=", ast.Slice: "a slice", ast.MatMult: "@",
 }  # fmt: skip
-_LANGUAGE = "a surface is written with numbers, tuples, math and plain functions only"
+_LANGUAGE = "use only numbers, tuples, math and plain functions"
 
 
 class Source:
-    """The text that the functions of one surface need, each helper once."""
+    """The text of the functions of one surface, with each helper once."""
 
     def __init__(self) -> None:
-        self.texts: list[str] = []  # definitions, each after those that it calls
+        self.texts: list[str] = []  # definitions, each after the functions that it calls
         self._names: dict[types.FunctionType, str] = {}
         self._open: list[types.FunctionType] = []
         self._count = 0
@@ -56,7 +56,7 @@ class Source:
         return next(function for function, given in self._names.items() if given == name)
 
     def add(self, function: Any, what: str, arguments: int) -> str:
-        """Take a function along that is called with so many numbers; return its name in the text."""
+        """Add a function that is called with so many numbers; return its name in the text."""
         function = _plain(function, what)
         needed = [p for p in inspect.signature(function).parameters.values() if p.default is p.empty]
         most = function.__code__.co_argcount
@@ -84,7 +84,7 @@ class Source:
 
 
 def from_text(text: str, what: str) -> types.FunctionType:
-    """Return the last function that a piece of source text defines; helpers and numbers may stand above it."""
+    """Return the last function that a source text defines; helpers and numbers may be defined before it."""
     filename = f"<{what} {hash(text):x}>"
     linecache.cache[filename] = (len(text), None, textwrap.dedent(text).splitlines(True), filename)
     names: dict[str, Any] = {"__name__": "__surface__", "math": math}
@@ -99,7 +99,7 @@ def from_text(text: str, what: str) -> types.FunctionType:
 
 
 def _plain(function: Any, what: str) -> types.FunctionType:
-    """Return the Python function behind what was given."""
+    """Return the Python function of a given object."""
     if isinstance(function, str):
         function = from_text(function, what)
     function = getattr(function, "py_func", function)  # compiled by numba
@@ -113,11 +113,11 @@ def _name(function: types.FunctionType) -> str:
 
 
 def _definition(function: types.FunctionType, what: str) -> tuple[ast.FunctionDef | ast.Lambda, int]:
-    """Return the syntax tree of a function, from the source that it was loaded from, and that text's first line."""
+    """Return the syntax tree of a function, from its source file, and the number of its first line."""
     code = function.__code__
     lines = linecache.getlines(code.co_filename, function.__globals__)
     is_lambda = code.co_name == "<lambda>"
-    first = 1 if is_lambda else code.co_firstlineno  # a lambda has no lines of its own: look through the file
+    first = 1 if is_lambda else code.co_firstlineno  # a lambda has no lines of its own: search the file
     found: list[ast.AST] = []
     if code.co_firstlineno <= len(lines):
         block = lines if is_lambda else inspect.getblock(lines[first - 1 :])
@@ -129,8 +129,8 @@ def _definition(function: types.FunctionType, what: str) -> tuple[ast.FunctionDe
         found = [node for node in ast.walk(tree) if isinstance(node, kind) and _is_code_of(node, code)]
     if not found:
         raise GeometryError(
-            f"{what}: the source of {_name(function)} ({code.co_filename}, line {code.co_firstlineno}) is not found, "
-            "or it has changed since it was loaded. Write the function in a file, or give its source as text: "
+            f"{what}: the source of {_name(function)} ({code.co_filename}, line {code.co_firstlineno}) was not found, "
+            "or has changed since it was loaded. Write the function in a file, or give its source as text: "
             f"'def {what}(...): ...'"
         )
     node = found[0]
@@ -143,7 +143,7 @@ def _is_code_of(node: ast.AST, code: types.CodeType) -> bool:
     if isinstance(node, ast.FunctionDef):
         if node.name != code.co_name:
             return False
-        # names of an outer function are found in its cells: compile under one that has them
+        # names of an outer function are in its cells: compile inside a function that has them
         node = ast.FunctionDef(**{field: getattr(node, field) for field in node._fields})
         node.decorator_list = []
         inner: ast.stmt = node
@@ -170,7 +170,7 @@ def _no_types() -> dict[str, Any]:
 
 
 def _same(one: types.CodeType, other: types.CodeType) -> bool:
-    """Return whether two codes do the same; what the module around them changes in their byte code does not count."""
+    """Return whether two codes do the same; differences caused by the surrounding module are ignored."""
     return one.co_varnames == other.co_varnames and _instructions(one) == _instructions(other)
 
 
@@ -188,7 +188,7 @@ def _instructions(code: types.CodeType) -> list[tuple[str, Any]]:
 
 
 class _Rewriter(ast.NodeTransformer):
-    """Puts what a function finds outside itself into its text, and refuses what cannot be compiled."""
+    """Insert what a function uses from outside into its text, and reject what cannot be compiled."""
 
     def __init__(self, source: Source, function: types.FunctionType, what: str, shift: int) -> None:
         self.source, self.function, self.what, self.shift = source, function, what, shift
@@ -235,13 +235,13 @@ class _Rewriter(ast.NodeTransformer):
         return self.literal(node.value, node, repr(node.value))
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST:
-        if isinstance(node.value, ast.Constant):  # a remark
+        if isinstance(node.value, ast.Constant):  # a docstring
             return ast.Pass()
         return self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         if node.keywords:
-            self.refuse(node, "an argument given by name", "give it by place")
+            self.refuse(node, "an argument given by name", "give it by position")
         arguments = [self.visit(argument) for argument in node.args]
         if not self.is_outer(node.func):
             self.refuse(node, ast.unparse(node.func))
@@ -269,13 +269,13 @@ class _Rewriter(ast.NodeTransformer):
         return self.literal(self.look_up(node), node, node.id)
 
     def is_outer(self, node: ast.AST) -> bool:
-        """Return whether a name, or what a dotted name begins with, comes from outside the function."""
+        """Return whether a name, or the first part of a dotted name, comes from outside the function."""
         while isinstance(node, ast.Attribute):
             node = node.value
         return isinstance(node, ast.Name) and node.id not in self.locals
 
     def look_up(self, node: ast.expr) -> Any:
-        """Return what a name, plain or dotted, stands for outside the function."""
+        """Return the value of a plain or dotted name outside the function."""
         if isinstance(node, ast.Attribute):
             owner = self.look_up(node.value)
             if not hasattr(owner, node.attr):
@@ -308,12 +308,14 @@ class _Rewriter(ast.NodeTransformer):
             return _signed(word, number)
         advice = _LANGUAGE
         if isinstance(value, list) or hasattr(value, "dtype"):
-            advice = f"take its numbers out first, as in a, b, c = {name}, or make it a tuple of numbers"
+            advice = (
+                f"first write its numbers to names, as in a, b, c = {name}, or make it a tuple of numbers"
+            )
         return self.refuse(node, f"{name}, which is {_article(value)},", advice)
 
 
 def _signed(number: ast.expr, sign: float) -> ast.expr:
-    """Return a number with a minus where it is negative: in (-2.0)**2 it has to stand in parentheses."""
+    """Return a number as an expression; a negative one as a minus, so that (-2.0)**2 gets its parentheses."""
     return ast.UnaryOp(ast.USub(), number) if sign < 0.0 else number
 
 
@@ -323,7 +325,7 @@ def _article(value: Any) -> str:
 
 
 def call(function: Callable[..., Any], *arguments: float) -> Any:
-    """Return a user's function's value; NaN where Python raises and compiled code would not."""
+    """Return the value of a user's function; NaN if Python raises an error that compiled code would not raise."""
     try:
         return function(*arguments)
     except (ArithmeticError, ValueError):

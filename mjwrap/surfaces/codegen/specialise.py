@@ -1,6 +1,6 @@
-"""Puts derived derivatives into the functions that use them, and leaves out what is multiplied by zero.
+"""Insert derived derivatives into the functions that use them, and remove products with zero.
 
-A compiler may not drop 0 * x, which is NaN where x is; here x is known to be finite where the surface is.
+A compiler must keep 0 * x, which is NaN if x is NaN; here x is known to be finite on the surface.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from mjwrap.surfaces.codegen.symbols import Lines
 def specialise(text: str, derived: dict[str, tuple[str, Lines]]) -> str:
     """Return a module text in which calls of derived functions are replaced by the lines that compute their values.
 
-    derived: for each function's name its arguments, one letter each, and its lines. A function calls it in one
-    statement `names = function(arguments)` only; names of the lines that this does not mention are its own.
+    derived: for each function's name its arguments, one letter each, and its lines. It is only called in statements
+    `names = function(arguments)`; other names in the lines are local.
     """
     tree = ast.parse(text)
     pieces = []
@@ -49,7 +49,7 @@ def _inline(function: ast.FunctionDef, derived: dict[str, tuple[str, Lines]]) ->
 def _written(
     targets: list[ast.expr], arguments: list[ast.expr], letters: str, lines: Lines
 ) -> list[ast.stmt]:
-    """Return a derived function's lines in the caller's names."""
+    """Return the lines of a derived function with the caller's names."""
     outputs = [name for name, _ in lines][-len(targets) :]
     new = {letter: ast.unparse(argument) for letter, argument in zip(letters, arguments, strict=True)}
     new |= {output: ast.unparse(target) for output, target in zip(outputs, targets, strict=True)}
@@ -63,7 +63,7 @@ def _written(
 
 
 def _used(lines: Lines, wanted: list[str]) -> set[str]:
-    """Return the names without which the wanted ones cannot be computed."""
+    """Return the names that are needed to compute the wanted ones."""
     used = set(wanted)
     for name, text in reversed(lines):
         if name in used:
@@ -80,7 +80,7 @@ class _Rename(ast.NodeTransformer):
 
 
 def _drop_zeros(function: ast.FunctionDef) -> None:
-    """Fold what is zero in a function into what is computed from it."""
+    """Simplify a function by the values that are zero in it."""
     stores = [n.id for n in ast.walk(function) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     folder = _Folder({name for name in stores if stores.count(name) == 1})
     for statement in function.body:
@@ -88,10 +88,10 @@ def _drop_zeros(function: ast.FunctionDef) -> None:
 
 
 class _Folder(ast.NodeTransformer):
-    """Replaces names that are zero by their value, in the order in which the statements run."""
+    """Replace names that are zero by their value, in the order of the statements."""
 
     def __init__(self, once: set[str]) -> None:
-        self.once = once  # names that are assigned at one place
+        self.once = once  # names that are assigned only once
         self.zeros: set[str] = set()
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:

@@ -1,6 +1,6 @@
-"""What a generated module defines before the fixed part that it takes from `kernels`: names for readers and checkers.
+"""Stubs of the names that a generated module defines before its template, for readers and type checkers.
 
-Never run: a generated module has the real ones in its place.
+They are never run: a generated module has the real definitions in their place.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 SIZE = 1.0  # about the smallest radius of curvature [m]
-REACH = 1.0  # radius of a sphere about the origin that holds the surface, or infinite [m]
+REACH = 1.0  # radius of a sphere about the origin that contains the surface, or infinite [m]
 SAMPLES = np.zeros((1, 5))  # points of the surface (n, 3); in a chart (n, 5), u and v before them
 
 # ------------------------------------------------------------------------------------------------ implicit
-BOX_X, BOX_Y, BOX_Z = 1.0, 1.0, 1.0  # half widths of the box in which the surface was looked at [m]
-FLOOR = 1.0  # gradients below are far from the surface
+BOX_X, BOX_Y, BOX_Z = 1.0, 1.0, 1.0  # half widths of the box in which the surface was checked [m]
+FLOOR = 1.0  # smaller gradients occur only far from the surface
 
 
 def value(x: float, y: float, z: float) -> tuple[float, ...]:
@@ -42,7 +42,7 @@ def chart(u: float, v: float) -> tuple[float, ...]:
 
 # --------------------------------------------------------------------------------------------------- both
 def inner(function: Any) -> Any:
-    """Compile a function that others of the module call; see `compiled.py`, as for the three below."""
+    """Compile a function for the module itself; see `compiled.py`, also for the three below."""
     return function
 
 

@@ -1,6 +1,6 @@
-"""Derivatives of a user's function, found symbolically and written out without repetitions.
+"""Derive a user's function symbolically, and write the derivatives without repeated subexpressions.
 
-The only module that imports sympy, and that only when derivatives have to be derived.
+Only this module imports sympy, and only when derivatives must be derived.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from mjwrap.text import counted
 
 Wanted = Mapping[
     str, tuple[int, str]
-]  # name: which number the function returns, and by which arguments to derive it
+]  # name: (index of the returned number, arguments by which it is derived)
 Lines = list[tuple[str, str]]  # (name, expression), in an order in which they can be run
 
 _MATH = (
     "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "erf", "exp", "log", "sin", "sinh",
     "sqrt", "tan", "tanh",
 )  # fmt: skip
-_SMALL = 1024  # a number whose denominator is not larger is taken for an exact fraction
+_SMALL = 1024  # a number with a denominator up to this is taken as an exact fraction
 _ADVICE = "write them yourself and pass them"
 
 
 def derive(
     text: str, entry: str, arguments: str, count: int, groups: Sequence[Wanted], what: str
 ) -> list[Lines]:
-    """Derive a function's derivatives; return for each group of wanted names the lines that compute them.
+    """Derive a function; return for each group of wanted names the lines that compute them.
 
     text: definitions as `Source` makes them; entry: the function's name there; arguments: one letter each; count: how
-    many numbers it returns; what: the function's name for the user. `GeometryError` where it cannot be derived.
+    many numbers it returns; what: the function's name in messages. Raises `GeometryError` if it cannot be derived.
     """
     import sympy
 
@@ -53,7 +53,7 @@ def derive(
 
 
 def _trace(text: str, entry: str, symbols: list[Any], what: str) -> list[Any]:
-    """Run a function on symbols; return the expressions that it returns."""
+    """Call a function with symbols; return the resulting expressions."""
     import sympy
 
     kept = {"abs": abs, "pow": pow, "len": len, "range": range, "float": lambda x: x}
@@ -66,21 +66,25 @@ def _trace(text: str, entry: str, symbols: list[Any], what: str) -> list[Any]:
     except GeometryError:
         raise
     except Exception as error:
-        reason = "it branches on its arguments" if "truth value" in str(error) else str(error)
+        reason = (
+            "it contains a branch that depends on its arguments"
+            if "truth value" in str(error)
+            else str(error)
+        )
         raise GeometryError(f"{what}: its derivatives cannot be derived ({reason}); {_ADVICE}") from error
 
 
 def _refusal(name: str, what: str) -> Any:
     def refuse(*_: Any) -> Any:
         raise GeometryError(
-            f"{what}: its derivatives cannot be derived ({name} has none everywhere); {_ADVICE}"
+            f"{what}: its derivatives cannot be derived ({name} is not differentiable everywhere); {_ADVICE}"
         )
 
     return refuse
 
 
 class _Math:
-    """Stands for the module `math` while a function is run on symbols."""
+    """A substitute for the module `math` when a function is called with symbols."""
 
     def __init__(self, what: str) -> None:
         self.what = what
@@ -109,7 +113,7 @@ class _Math:
 
 
 class _Exact(ast.NodeTransformer):
-    """Marks decimal numbers, so that sympy takes those that are whole or plain fractions for what they are."""
+    """Mark decimal numbers, so that sympy treats whole numbers and simple fractions as exact."""
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         if not isinstance(node.value, float):
@@ -125,7 +129,7 @@ def _exact(value: float) -> Any:
 
 
 def _without_deltas(expression: Any, what: str) -> Any:
-    """Return a derivative without the Dirac deltas that vanish, as in those of abs(x)**2.5."""
+    """Return a derivative without Dirac deltas that vanish, as in derivatives of abs(x)**2.5."""
     import sympy
 
     if not expression.has(sympy.DiracDelta):
@@ -146,7 +150,7 @@ def _without_deltas(expression: Any, what: str) -> Any:
 
 
 def _lines(names: list[str], expressions: list[Any], what: str) -> Lines:
-    """Return the lines that compute expressions under their names, what they share computed once."""
+    """Return the lines that compute named expressions, with common subexpressions computed once."""
     import sympy
 
     known = (
@@ -172,7 +176,7 @@ def _printer() -> Any:
     from sympy.printing.pycode import PythonCodePrinter
 
     class Printer(PythonCodePrinter):
-        """Writes numbers with all their digits, and half powers with a root."""
+        """Write numbers with all digits, and half powers with a square root."""
 
         def _print_Float(self, expr: Any) -> str:
             return repr(float(expr))

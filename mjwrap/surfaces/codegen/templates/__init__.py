@@ -1,1 +1,1 @@
-"""The fixed part of generated modules: geodesic, projection, height; read as text by `generate.py`, never imported."""
+"""Templates of generated modules: geodesic, projection, height; `generate.py` reads them as text."""

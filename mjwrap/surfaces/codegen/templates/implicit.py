@@ -25,11 +25,11 @@ from mjwrap.surfaces.codegen.stubs import (
 # ------------------------------------------------------------------------------------- generated modules begin here
 
 FIRST_STEP = 1.0  # in lengths over which the gradient changes by its own size
-TOLERANCE = 5e-12  # of a step's error estimate: the error is then below 1e-12
-AIM = 2e-12  # estimate for which the next step is chosen
-ORDER = 1.0 / 15.0  # power by which a step follows its estimate
-NOISE = 2e-11  # an estimate below that does not fall with the step is the rounding of the function itself
-SHORTEST_STEP = 1e-5  # as a share of SIZE; such a step is taken whatever its estimate
+TOLERANCE = 5e-12  # largest error estimate of a step: the error is then below 1e-12
+AIM = 2e-12  # error estimate for which the next step is chosen
+ORDER = 1.0 / 15.0  # power of the estimate by which the step changes
+NOISE = 2e-11  # a smaller estimate that does not decrease with the step is rounding of the function itself
+SHORTEST_STEP = 1e-5  # smallest step relative to SIZE; it is accepted with any estimate
 MAX_STEPS = 500
 MAX_PROJECTIONS = 40
 
@@ -58,7 +58,7 @@ def field(x, y, z, tx, ty, tz):
 
 @inner
 def shape(x, y, z, tx, ty, tz):
-    """Return the unit normal; kappa, tau, beta for the tangent t; and how fast the gradient changes [1/m]."""
+    """Return the unit normal; kappa, tau, beta for the tangent t; and the relative rate of the gradient [1/m]."""
     gx, gy, gz, hxx, hyy, hzz, hxy, hxz, hyz = second(x, y, z)
     over = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
     nx, ny, nz = gx * over, gy * over, gz * over
@@ -94,7 +94,7 @@ def onto(x, y, z):
 
 @inner
 def nearest_sample(x, y, z):
-    """Return the nearest of the points of the surface that were found when the module was made."""
+    """Return the nearest of the sample points that were found when the module was made."""
     best, found = math.inf, 0
     for i in range(SAMPLES.shape[0]):
         dx, dy, dz = SAMPLES[i, 0] - x, SAMPLES[i, 1] - y, SAMPLES[i, 2] - z
@@ -152,7 +152,7 @@ def nearest(x, y, z):
 
 @inner
 def outside_box(x, y, z):
-    """Return 1.0 where a point lies outside the box in which the surface was looked at, else 0.0."""
+    """Return 1.0 if a point lies outside the box in which the surface was checked, else 0.0."""
     return 1.0 if abs(x) > BOX_X or abs(y) > BOX_Y or abs(z) > BOX_Z else 0.0
 
 
@@ -182,7 +182,7 @@ def middle_kappa(h, x, y, z, tx, ty, tz, x1, y1, z1, tx1, ty1, tz1):
 
 @geodesic_entry
 def geodesic(start, out):
-    """Follow a geodesic from start = (P, t, s); fill out (31) as `mjwrap/kernels/geometry/user_surface.py` says."""
+    """Follow a geodesic from start = (P, t, s); fill out (31), see `mjwrap/kernels/geometry/user_surface.py`."""
     x, y, z = start[0], start[1], start[2]
     s = start[6]
     tx, ty, tz = tangent(x, y, z, start[3], start[4], start[5])
@@ -194,7 +194,7 @@ def geodesic(start, out):
     a, da, r, dr = 1.0, 0.0, 0.0, 1.0
     kappa_min, r_min, left = kappa, 1.0, outside_box(x, y, z)
     rest, longest = s, FIRST_STEP / rate
-    before = math.inf  # the estimate of a step that was tried again
+    before = math.inf  # error estimate of a step that was repeated
     for _ in range(MAX_STEPS):
         if not abs(rest) > 0.0:
             break
@@ -215,7 +215,7 @@ def geodesic(start, out):
                 break
         before = math.inf
         rest = 0.0 if h == rest else rest - h
-        if rest == 0.0:  # the last one ends on the surface to the last digit
+        if rest == 0.0:  # the last step ends on the surface to the last digit
             x1, y1, z1, _ = onto(x1, y1, z1)
             tx1, ty1, tz1 = tangent(x1, y1, z1, tx1, ty1, tz1)
         kappa_min = min(kappa_min, middle_kappa(h, x, y, z, tx, ty, tz, x1, y1, z1, tx1, ty1, tz1))
@@ -226,7 +226,7 @@ def geodesic(start, out):
         r_min = min(r_min, r / (s - rest))
         left = max(left, outside_box(x, y, z))
     if rest != 0.0:
-        x = math.nan  # more turns than a muscle can take, or no surface there
+        x = math.nan  # more turns than a muscle can have, or no surface there
     out[3], out[4], out[5] = x, y, z
     out[9], out[10], out[11] = tx, ty, tz
     out[15], out[16], out[17] = nx, ny, nz
@@ -246,4 +246,4 @@ def height(x, y, z):
     """Return the distance from the surface, to first order near it, negative inside."""
     phi, gx, gy, gz = value(x, y, z)
     steepness = math.sqrt(gx * gx + gy * gy + gz * gz)
-    return phi / (steepness if steepness > FLOOR else FLOOR)  # also where there is no gradient
+    return phi / (steepness if steepness > FLOOR else FLOOR)  # also if the gradient is zero

@@ -29,11 +29,11 @@ from mjwrap.surfaces.codegen.stubs import (
 # ------------------------------------------------------------------------------------- generated modules begin here
 
 FIRST_STEP = 1.0  # in radii of curvature
-TOLERANCE = 5e-12  # of a step's error estimate: the error is then below 1e-12
-AIM = 2e-12  # estimate for which the next step is chosen
-ORDER = 1.0 / 15.0  # power by which a step follows its estimate
-NOISE = 2e-11  # an estimate below that does not fall with the step is the rounding of the function itself
-SHORTEST_STEP = 1e-5  # as a share of SIZE; such a step is taken whatever its estimate
+TOLERANCE = 5e-12  # largest error estimate of a step: the error is then below 1e-12
+AIM = 2e-12  # error estimate for which the next step is chosen
+ORDER = 1.0 / 15.0  # power of the estimate by which the step changes
+NOISE = 2e-11  # a smaller estimate that does not decrease with the step is rounding of the function itself
+SHORTEST_STEP = 1e-5  # smallest step relative to SIZE; it is accepted with any estimate
 MAX_STEPS = 500
 MAX_ITERATIONS = 60
 
@@ -42,8 +42,8 @@ MAX_ITERATIONS = 60
 def field(u, v, du, dv):
     """Return u'', v'' of a geodesic and the Gaussian curvature.
 
-    The part of r_uu u'^2 + 2 r_uv u'v' + r_vv v'^2 within the surface is cancelled by r_u u'' + r_v v'': the geodesic
-    equation with its Christoffel symbols multiplied out.
+    r_u u'' + r_v v'' cancels the tangential part of r_uu u'^2 + 2 r_uv u'v' + r_vv v'^2: this is the geodesic equation
+    without explicit Christoffel symbols.
     """
     _, _, _, xu, yu, zu, xv, yv, zv, xuu, yuu, zuu, xuv, yuv, zuv, xvv, yvv, zvv = chart(u, v)
     uu, uv, vv = du * du, 2.0 * du * dv, dv * dv
@@ -104,7 +104,7 @@ def rates(tx, ty, tz, xu, yu, zu, xv, yv, zv):
 
 @inner
 def within(w, low, high, periodic):
-    """Return a coordinate kept within one width of its range, where that does not close on itself."""
+    """Return a coordinate limited to one width around its range, if the range is not periodic."""
     width = high - low
     return w if periodic else min(max(w, low - width), high + width)
 
@@ -113,7 +113,7 @@ def within(w, low, high, periodic):
 def nearest(x, y, z):
     """Return u and v of the point of the surface nearest to (x, y, z).
 
-    Newton's method on half the square of the distance, from the nearest sample; Gauss-Newton where that is not convex.
+    Newton's method for half the squared distance, from the nearest sample; Gauss-Newton if that is not convex.
     """
     best, found = math.inf, 0
     for i in range(SAMPLES.shape[0]):
@@ -159,7 +159,7 @@ def nearest(x, y, z):
 
 @inner
 def outside_range(u, v):
-    """Return 1.0 where a point lies beyond a range that does not close on itself, else 0.0."""
+    """Return 1.0 if a point lies beyond a range that is not periodic, else 0.0."""
     beyond = not PERIODIC_U and not U_LOW <= u <= U_HIGH
     return 1.0 if beyond or (not PERIODIC_V and not V_LOW <= v <= V_HIGH) else 0.0
 
@@ -175,7 +175,7 @@ def middle_kappa(h, u, v, du, dv, u1, v1, du1, dv1):
 
 @geodesic_entry
 def geodesic(start, out):
-    """Follow a geodesic from start = (P, t, s); fill out (31) as `mjwrap/kernels/geometry/user_surface.py` says."""
+    """Follow a geodesic from start = (P, t, s); fill out (31), see `mjwrap/kernels/geometry/user_surface.py`."""
     s = start[6]
     u, v = nearest(start[0], start[1], start[2])
     _, _, _, xu, yu, zu, xv, yv, zv, _, _, _, _, _, _, _, _, _ = chart(u, v)
@@ -191,7 +191,7 @@ def geodesic(start, out):
     a, da, r, dr = 1.0, 0.0, 0.0, 1.0
     kappa_min, r_min, left = kappa, 1.0, outside_range(u, v)
     rest, longest = s, FIRST_STEP / (math.sqrt(kappa * kappa + 2.0 * tau * tau + beta * beta) + 0.01 / SIZE)
-    before = math.inf  # the estimate of a step that was tried again
+    before = math.inf  # error estimate of a step that was repeated
     for _ in range(MAX_STEPS):
         if not abs(rest) > 0.0:
             break
@@ -218,7 +218,7 @@ def geodesic(start, out):
         r_min = min(r_min, r / (s - rest))
         left = max(left, outside_range(u, v))
     if rest != 0.0:
-        x = math.nan  # more turns than a muscle can take, or no surface there
+        x = math.nan  # more turns than a muscle can have, or no surface there
     out[3], out[4], out[5] = x, y, z
     out[9], out[10], out[11] = tx, ty, tz
     out[15], out[16], out[17] = nx, ny, nz

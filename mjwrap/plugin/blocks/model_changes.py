@@ -1,7 +1,7 @@
-"""Lists the regions of an mjModel from which the muscles' arrays were made, for `callbacks/follow.py` to compare.
+"""List the regions of an mjModel from which the muscles' arrays were made; `callbacks/sync.py` compares them.
 
-Where numbers there are changed while the model is in use, the muscles change with them. Changed names and texts count
-for new mjData only, and so do ids and kinds, unless another model is used with the same mjData.
+If numbers in these regions are changed while the model is in use, the muscles change with them. Changed names and texts
+take effect in new mjData only, and so do ids and kinds, unless another model is used with the same mjData.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mjwrap.kernels.musculotendon.dispatch import MUJOCO
 from mjwrap.mjcf import MuscleDeclaration, Node
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.callbacks import block as bk
-from mjwrap.plugin.callbacks.follow import BIAS, BINDING, CONTROL, DRIVE, POINTERS, REGION
+from mjwrap.plugin.callbacks.sync import BIAS, BINDING, CONTROL, DRIVE, POINTERS, REGION
 from mjwrap.plugin.mujoco_c.fingerprint import buffer_layout
 from mjwrap.plugin.mujoco_c.offsets import check_pointer
 from mjwrap.surfaces.rows import surface_rows
@@ -34,8 +34,10 @@ _STRUCTURE = (
 
 
 class Watch(NamedTuple):
-    """Lists of regions (k, 3), the bytes that they hold now, the rows (k, 5) that copy plain numbers, and what
-    of MuJoCo's laws and controls is followed where the kernels read it, see `callbacks/follow.py`.
+    """The regions of a model that are watched, as `callbacks/sync.py` describes them.
+
+    plain, derived, structure: lists of regions (k, 3); ..._seen: the bytes that these contain now. bound (k, 5): the
+    rows that copy plain numbers. drives, pointers: the parts of MuJoCo's laws and controls that are compared directly.
     """
 
     plain: Words
@@ -50,7 +52,7 @@ class Watch(NamedTuple):
 
 
 class _Lists:
-    """Collects regions and bindings of one model."""
+    """Collect regions and bindings of one model."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model = model
@@ -68,7 +70,7 @@ class _Lists:
         return self.pointers[name]
 
     def watch(self, name: str, first: int = 0, rows: int = -1) -> None:
-        """Add rows of an array as a region, in its own numbers; all from the first on for -1."""
+        """Add rows of an array as a region, counted in numbers of the array; rows = -1: all from the first on."""
         array = getattr(self.model, name)
         part = array[first : len(array) if rows < 0 else first + rows]
         if part.size:
@@ -90,7 +92,7 @@ class _Lists:
         self.plain.setdefault(name, []).append(row)
 
     def take(self) -> tuple[Words, bytes]:
-        """Return the regions collected since the last call, and what they hold."""
+        """Return the regions collected since the last call, and their contents."""
         regions = np.array(self.regions, dtype=np.int64).reshape(-1, REGION)
         found = regions, b"".join(self.seen)
         self.regions, self.seen = [], []
@@ -113,7 +115,7 @@ def _drive(lists: _Lists, plan: Plan, m: int, actuator: int) -> tuple[int, int, 
 
 
 def _bind_surface(lists: _Lists, k: int, node: Node) -> None:
-    """Bind the sizes of node k to its geom where they are the geom's as they stand, else watch them."""
+    """Bind the sizes of node k to its geom if they are equal to the geom's sizes, else watch these."""
     if node.sizes >= 0 or node.surface is None:
         return  # the numerics are watched together
     if not node.surface.geom_columns:
@@ -126,7 +128,7 @@ def _bind_surface(lists: _Lists, k: int, node: Node) -> None:
 
 
 def watch(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> Watch:
-    """Return what the arrays of these muscles follow in a model of the same layout as `model`."""
+    """Return the regions on which the arrays of these muscles depend, in a model with the layout of `model`."""
     lists = _Lists(model)
     k = 0
     drives = np.zeros((len(muscles), DRIVE), dtype=np.int64)

@@ -1,6 +1,6 @@
 """First guesses of a fit, by linear least squares: frames and sizes from which the nonlinear fit converges.
 
-Points come centred on their mean and scaled to a mean square distance of one. Several guesses are made, because the
+Points are centred on their mean and scaled to a mean square distance of one. Several guesses are made, because the
 points' principal axes do not determine the axis of a surface if the points cover only a part of it. The best fit is
 used.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from mjwrap.fitting import shapes
 from mjwrap.fitting.shapes import Array, Shape
 
-DIRECTIONS = 13  # axes tried besides the principal ones, spread over a half sphere
+DIRECTIONS = 13  # number of axes tried in addition to the principal ones, spread over a half sphere
 WIDEST = 20.0  # largest size of a guess
 
 
@@ -68,7 +68,7 @@ def _about_axis(shape: Shape, x: Array) -> Iterator[tuple[Array, Array, Array]]:
 
 
 def _rings(origin: Array, far: Array, z: Array) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield tori: the whole ring, and its inner or outer side where the distance from the axis bends with z."""
+    """Yield tori: the whole ring, and its inner or outer side if the distance from the axis is curved along z."""
     major, minor = float(far.mean()), float(np.sqrt(np.var(far) + np.var(z)))
     yield origin, np.eye(3), np.array([major, min(minor, 0.9 * major)])
     level, tilt, bend = _polynomial(z, far, 2)
@@ -80,7 +80,7 @@ def _rings(origin: Array, far: Array, z: Array) -> Iterator[tuple[Array, Array, 
 
 
 def _ellipsoids(x: Array, principal: Array) -> Iterator[Guess]:
-    """Yield the quadric of least algebraic error where it is an ellipsoid, then ellipsoids along the principal axes."""
+    """Yield the quadric of least algebraic error, if it is an ellipsoid, then ellipsoids along the principal axes."""
     a, b, c = x.T
     columns = np.column_stack([a * a, b * b, c * c, a * b, a * c, b * c, a, b, c])
     q = np.linalg.lstsq(columns, np.ones(len(x)), rcond=None)[0]
@@ -98,7 +98,7 @@ def _ellipsoids(x: Array, principal: Array) -> Iterator[Guess]:
 
 
 def _polynomial(x: Array, y: Array, degree: int) -> Array:
-    """Return coefficients (degree + 1,) by least squares, the constant first; the smallest where many are as good."""
+    """Return coefficients (degree + 1,) by least squares, the constant first; the smallest if they are not unique."""
     return np.asarray(
         np.linalg.lstsq(np.vander(x, degree + 1, increasing=True), y, rcond=None)[0], dtype=np.float64
     )
@@ -117,7 +117,7 @@ def _about_z(turn: float) -> Array:
 
 
 def _towards(axis: Array) -> Array:
-    """Return a rotation (3, 3) that takes z to an axis."""
+    """Return a rotation (3, 3) that turns z to an axis."""
     across = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(across, axis)
     x /= np.linalg.norm(x)

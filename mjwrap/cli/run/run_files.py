@@ -1,4 +1,4 @@
-"""The files of a run: tables, plot, recording and film, each opened before it and completed after it."""
+"""The files of a run: tables, plot, recording and film, opened before the run and completed after it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mjwrap.runs.simulation import Log
 
 @dataclass(frozen=True)
 class FilmSettings:
-    """A film of a run, as `Video` takes it: width and height [pixels], frames a second, speed, camera."""
+    """The settings of a film, as `Video` takes them: width and height [pixels], frames per second, speed, camera."""
 
     path: str
     width: int
@@ -32,9 +32,9 @@ class FilmSettings:
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """The files that a run is to leave; None for those that were not asked for.
+    """The output files of a run; None for files that were not asked for.
 
-    kinds: which numbers the tables (csv and table) hold. analysis: the prefix of tables in OpenSim's layout.
+    kinds: the quantities in the tables (csv and table). analysis: the prefix of tables in OpenSim's layout.
     """
 
     recording: RecordingSettings
@@ -47,7 +47,7 @@ class OutputSettings:
 
     @property
     def files(self) -> dict[str, str]:
-        """The places that were asked for, by what goes there."""
+        """The files that were asked for, by kind of output."""
         places = {
             "recording": self.recording.path,
             "video": self.film.path if self.film else None,
@@ -62,10 +62,10 @@ class OutputSettings:
 def open_outputs(
     settings: OutputSettings, source: str, engine: Engine, stack: contextlib.ExitStack
 ) -> tuple[list[Log], list[Callable[[], None]]]:
-    """Open every file that was asked for; return what to call at each sample, and what at the end.
+    """Open the output files; return the functions to call at each sample, and those to call at the end.
 
-    A place that cannot be written is a `UserError` here, before the run. What has to be closed in any case goes on
-    `stack`. source: the model's file or name, for the title of the plot.
+    `stack` closes what has to be closed however the run ends. source: the model's file or name, for the title of the
+    plot. Raises `UserError` if a file cannot be written.
     """
     model, muscles = engine.muscles.model, engine.muscles
     logs: list[Log] = []

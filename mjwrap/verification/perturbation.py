@@ -14,9 +14,9 @@ from mjwrap.verification.arcs import arcs_of
 from mjwrap.verification.certificate import Case, Group, grouped, laid_out
 from mjwrap.verification.shapes import Array, Shape, dot, unit
 
-SHAKE = 1e-3  # of a shift, in radii: errors of the differences are about its square
+STEP = 1e-3  # length of a shift, in radii; the error of the differences is of the order of its square
 SHOOTING = 12  # Newton steps for the geodesic between two given points
-SHORT = 0.02  # an arc below this share of a radius is left alone: its ends move together
+SHORT = 0.02  # an arc shorter than this share of a radius is not tested, because its ends move together
 
 
 def between(shape: Shape, d: Array, P: Array, Q: Array, t: Array, s: Array) -> Array:
@@ -37,10 +37,10 @@ def shifted(shape: Shape, d: Array, P: Array, b: Array, by: Array) -> Array:
     return arcs_of(shape, d, P, np.sign(by)[:, None] * b, np.abs(by)).Q
 
 
-def shaken_stiffness(case: Case) -> Array:
+def stiffness_by_differences(case: Case) -> Array:
     """Return the second derivative of a path's length (2n, 2n) in sideways shifts of P and Q of its n geodesics [1/m].
 
-    Second differences; `ValueError` for an arc that is too short for them.
+    Computed by second differences. Raises `ValueError` for an arc that is too short for them.
     """
     touches, _, _ = laid_out(0, case)
     groups = grouped([case], touches)
@@ -51,7 +51,7 @@ def shaken_stiffness(case: Case) -> Array:
     for group in groups:
         for k in range(len(group.touches)):
             place = places[id(group.touches[k])]
-            H[2 * place : 2 * place + 2, 2 * place : 2 * place + 2], moved[place] = _shaken_arc(
+            H[2 * place : 2 * place + 2, 2 * place : 2 * place + 2], moved[place] = _differentiated_arc(
                 case, group, k
             )
     fixed = np.zeros(1)
@@ -67,13 +67,13 @@ def shaken_stiffness(case: Case) -> Array:
     return H
 
 
-def _shaken_arc(case: Case, group: Group, k: int) -> tuple[Array, tuple[Array, Array, Array]]:
+def _differentiated_arc(case: Case, group: Group, k: int) -> tuple[Array, tuple[Array, Array, Array]]:
     """Return the second derivative of one geodesic's length, and its ends shifted by -h, 0, h (3, 3), in the world."""
     shape, d = group.shape, group.d[k : k + 1]
     size = 1.0 / float(shape.bend(d)[0])
     if group.s[k] < SHORT * size:
-        raise ValueError(f"an arc of {group.s[k]:.1e} m is too short to be shaken")
-    h = min(SHAKE * size, 0.05 * float(group.s[k]))
+        raise ValueError(f"an arc of {group.s[k]:.1e} m is too short for differences")
+    h = min(STEP * size, 0.05 * float(group.s[k]))
     P, Q, t = group.P[k], group.arcs.Q[k], group.t[k]
     b_P = np.cross(t, shape.normal(d, P[None])[0])
     b_Q = np.cross(group.arcs.t[k], shape.normal(d, Q[None])[0])

@@ -1,4 +1,4 @@
-"""Finds implausible muscle parameters: from the parameters alone, over the joints' ranges, and at rest."""
+"""Find implausible muscle parameters: from the parameters alone, over the joints' ranges, and at rest."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ Found = Iterator[tuple[Implausible, float, float, str]]
 
 
 class Unit(NamedTuple):
-    """A muscle of any law as fibre and rigid tendon: F_max [N], lengths [m], sin α₀, declared length range [m].
+    """A muscle of any law as a fibre with a rigid tendon: F_max [N], lengths [m], sin α₀, declared length range [m].
 
-    The fibre of an actuator without one has length NaN.
+    If the law has no fibre, its length is NaN.
     """
 
     peak: float
@@ -38,13 +38,13 @@ class Unit(NamedTuple):
     declared: tuple[float, float] | None
 
     def fiber(self, length: float) -> float:
-        """Return the normalised fibre length at a musculotendon length; negative: how much shorter than the tendon."""
+        """Return the normalised fibre length at a musculotendon length; negative if this is below the tendon's."""
         along = (length - self.slack) / self.optimal
         return along if along <= 0.0 else math.hypot(along, self.height)
 
 
 def as_unit(law: Law) -> Unit:
-    """Return the parameters of a law; one without fibre and tendon has a force only."""
+    """Return the parameters of a law; a law without fibre and tendon has only a force."""
     if isinstance(law, MuJoCoMuscle):
         short, long = (x / law.gear for x in law.length_range)
         optimal = (long - short) / (law.prm[1] - law.prm[0])
@@ -71,13 +71,13 @@ def implausible(
 
     Args:
         muscles: the muscles.
-        ranges: from `length_ranges`, which is called if None. A muscle that is not in it is judged by its parameters
+        ranges: from `length_ranges`, which is called if None. Muscles missing there are judged by their parameters
             alone.
         rest: (nq,) pose at which no muscle should pull much without activation; qpos0 if None.
-        limits: what counts as plausible.
+        limits: the limits of plausible values.
 
     Returns:
-        All findings, and what could not be judged.
+        All findings, and remarks on muscles that could not be judged.
 
     Raises:
         StateError: the rest pose is not possible.
@@ -94,7 +94,7 @@ def implausible(
             found += _over_range(unit, known, limits)
         share = passive[i] / unit.peak if unit.peak > 0.0 else 0.0  # NaN without a path
         if share > limits.passive:
-            words = f"pulls with {share:.3g} F_max at rest, without activation"
+            words = f"pulls with {share:.3g} F_max at rest without activation"
             found.append((Implausible.PASSIVE_AT_REST, share, limits.passive, words))
         findings += [Finding(muscle.name, *parts) for parts in found]
         told = _remarks(known)
@@ -103,9 +103,9 @@ def implausible(
         if told:
             remarks[muscle.name] = told
     for name, law, reason in _native_laws(muscles):
-        told = f"stays with MuJoCo, no path of its own to judge it along: {reason}"
+        told = f"stays with MuJoCo, so it is not judged along a geodesic path: {reason}"
         if isinstance(law, str):
-            told = f"{told}; and its parameters have no meaning: {law}"
+            told = f"{told}; its parameters are not valid: {law}"
         else:
             findings += [Finding(name, *parts) for parts in _alone(as_unit(law), limits)]
         remarks[name] = (told,)
@@ -113,7 +113,7 @@ def implausible(
 
 
 def _alone(unit: Unit, limits: ParameterLimits) -> Found:
-    """Find what the parameters show by themselves."""
+    """Find implausible values in the parameters alone."""
     low, high = limits.force
     if not unit.peak >= low:
         yield Implausible.NO_FORCE, unit.peak, low, f"maximum isometric force {unit.peak:.3g} N"
@@ -133,23 +133,25 @@ def _alone(unit: Unit, limits: ParameterLimits) -> Found:
 
 
 def _over_range(unit: Unit, known: LengthRange, limits: ParameterLimits) -> Found:
-    """Find what shows over the joints' ranges."""
+    """Find implausible values over the joints' ranges."""
     if math.isnan(unit.optimal):
         return
     shortest, longest = known.shortest, known.longest
     if longest <= unit.slack:
-        words = f"at its longest, {longest:.4f} m, it is not as long as its tendon, {unit.slack:.4f} m"
+        words = (
+            f"its longest length, {longest:.4f} m, is less than its tendon slack length, {unit.slack:.4f} m"
+        )
         yield Implausible.SLACK, longest, unit.slack, words
     else:
         low, high = unit.fiber(shortest), unit.fiber(longest)
         least, most = limits.fiber
         if low < least:
-            words = f"fibre {low:.3g} optimal lengths at its shortest, {shortest:.4f} m"
+            words = f"fibre {low:.3g} optimal lengths at the shortest length, {shortest:.4f} m"
             if low <= 0.0:
                 words = f"shorter than its tendon by {-low:.3g} optimal fibre lengths at its shortest, {shortest:.4f} m"
             yield Implausible.SHORT_FIBER, low, least, words
         if high > most:
-            words = f"fibre {high:.3g} optimal lengths at its longest, {longest:.4f} m"
+            words = f"fibre {high:.3g} optimal lengths at the longest length, {longest:.4f} m"
             yield Implausible.LONG_FIBER, high, most, words
     if unit.declared is not None:
         short, long = unit.declared
@@ -160,7 +162,7 @@ def _over_range(unit: Unit, known: LengthRange, limits: ParameterLimits) -> Foun
 
 
 def _remarks(known: LengthRange | None) -> tuple[str, ...]:
-    """Say what a length range leaves open."""
+    """Return remarks on a length range."""
     if known is None:
         return ()
     told = []
@@ -169,12 +171,12 @@ def _remarks(known: LengthRange | None) -> tuple[str, ...]:
         why = ", ".join(f"{name} {count}" for name, count in known.without_path.items())
         told.append(f"no path at {failed} of {counted(known.poses, 'pose')} ({why})")
     if known.held:
-        told.append(f"held still, for want of a range: {', '.join(known.held)}")
+        told.append(f"not moved, because they have no range: {', '.join(known.held)}")
     return tuple(told)
 
 
 def _passive_tension(muscles: MuscleSystem, rest: ArrayLike | None) -> NDArray[np.float64]:
-    """Return the tension (n,) [N] at rest without activation or motion, tendon rigid; NaN without a path."""
+    """Return the tension (n,) [N] at rest, without activation and motion, with a rigid tendon; NaN without a path."""
     model = copy.copy(muscles.model)
     data = mujoco.MjData(model)
     if rest is not None:
@@ -193,7 +195,7 @@ def _passive_tension(muscles: MuscleSystem, rest: ArrayLike | None) -> NDArray[n
 
 
 def _native_laws(muscles: MuscleSystem) -> Iterator[tuple[str, MuJoCoMuscle | str, str]]:
-    """Yield name, law (or why there is none) and reason of every muscle actuator that stays with MuJoCo."""
+    """Yield name, law (or why it is not valid) and reason of every muscle actuator that stays with MuJoCo."""
     model = muscles.model
     for actuator in range(model.nactuator):
         name = name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)

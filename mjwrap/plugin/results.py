@@ -1,4 +1,4 @@
-"""`Muscles`: shows what the engine plugin last computed for an mjData as a MuscleSystem shows its results."""
+"""`Muscles`: the engine plugin's last results for an mjData, with the attributes of a MuscleSystem."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import Declarations
-from mjwrap.plugin.blocks.reading import read_instances
+from mjwrap.plugin.blocks.instance_muscles import read_instances
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.readout import block_address, head_of, instances, transmit
 from mjwrap.plugin.spec.configuration import TRANSMISSION, configuration_at
@@ -24,12 +24,12 @@ _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 
 
 class Muscles(Results):
-    """The muscles that the engine plugin runs for one `MjData`: at any time, what was last evaluated for it.
+    """The results of the muscles that the engine plugin runs for one `MjData`, always those of the last evaluation.
 
-    data: of a model that `install` or `load` returned; its muscles stand in the order of `mjwrap.plugin.read`. The
-    results belong to the state that `mj_forward` saw, or from which the last `mj_step` began (under RK4: its last
-    stage). They have the names, units and signs of `MuscleSystem`. Raises `StateError` where the model has no plugin,
-    and from `time` before the first evaluation and where `data` was changed since the last one.
+    data: of a model that `install` or `load` returned. Names, units and signs are those of `MuscleSystem`, the order of
+    muscles that of `mjwrap.plugin.read`. The results belong to the state at the last `mj_forward`, or at the start of
+    the last `mj_step` (under RK4: at its last stage). Raises `StateError` if the model has no plugin; `time` also
+    raises it before the first evaluation and after a change of `data`.
     """
 
     def __init__(self, data: mujoco.MjData) -> None:
@@ -49,7 +49,7 @@ class Muscles(Results):
 
     @property
     def time(self) -> float:
-        """Simulation time [s] to which all results belong."""
+        """Simulation time [s] of all results."""
         data, first = self.data, self._instances[0]
         block = block_address(data, first)
         clock = np.ctypeslib.as_array(
@@ -66,9 +66,9 @@ class Muscles(Results):
         return float(data.time) - ahead
 
     def poses(self, data: mujoco.MjData) -> mujoco.MjData:
-        """Return the data whose `xpos` and `xquat` the results belong to, which is `data`; `StateError` for another."""
+        """Return the data with the poses of the results, which is `data` itself; `StateError` for another."""
         if data is not self.data:
-            raise StateError("these muscles belong to another MjData: make Muscles(data) for each")
+            raise StateError("these Muscles belong to another MjData: make a Muscles(data) for each MjData")
         return data
 
     def _evaluation(self) -> Evaluation:
@@ -86,7 +86,7 @@ class Muscles(Results):
 
 
 def _view(block: int) -> Evaluation:
-    """The results in a block as they change: arrays that share its memory."""
+    """Return the results in a block as arrays that share its memory."""
     head = head_of(block)
     n, nodes, routes = int(head[bk.MUSCLES]), int(head[bk.NODES]), int(head[bk.ROUTES])
 
@@ -95,7 +95,9 @@ def _view(block: int) -> Evaluation:
         return np.ctypeslib.as_array((kind * int(np.prod(shape))).from_address(start)).reshape(shape)
 
     view = Evaluation(n, array("node", ctypes.c_double, nodes, layout.ROW), routes)
-    view.numbers = array("activation", ctypes.c_double, len(NUMBERS), n)  # they stand there in this order
+    view.numbers = array(
+        "activation", ctypes.c_double, len(NUMBERS), n
+    )  # consecutive in the block, in this order
     view.activation, view.fiber, view.length, view.velocity, view.tension = view.numbers
     view.segments = array("seg", ctypes.c_double, nodes + routes, segments.SEGMENT)
     view.info = array("info", ctypes.c_double, routes, layout.INFO)
@@ -107,7 +109,7 @@ def _view(block: int) -> Evaluation:
 
 
 def _joined(views: list[Evaluation]) -> Evaluation:
-    """A copy of the results of several instances, one after the other."""
+    """Return a copy of the results of several instances, one after the other."""
     nodes, routes = 0, sum(len(view.count) for view in views)
     n = sum(len(view.status) for view in views)
     joined = Evaluation(n, np.concatenate([view.node for view in views]), routes)
@@ -118,7 +120,7 @@ def _joined(views: list[Evaluation]) -> Evaluation:
     row = 0
     for view in views:
         rows = slice(row, row + len(view.segments))
-        joined.segments[rows, [segments.G_NEAR]] += nodes  # numbers of nodes
+        joined.segments[rows, [segments.G_NEAR]] += nodes  # indices of nodes
         joined.segments[rows, [segments.G_FAR]] += nodes
         row, nodes = rows.stop, nodes + len(view.node)
     return joined

@@ -1,4 +1,4 @@
-"""The verdict on each muscle in a sentence: which of the two is right, and why."""
+"""The verdict on each muscle in a sentence: which program is right, and why."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from mjwrap.text import counted
 class Verdict(NamedTuple):
     """Which program is right, and why.
 
-    right: "both", "mjwrap", "MuJoCo", "neither", "-" (nothing to compare), or "mjwrap in motion": both are at every
-    pose by itself, but from pose to pose MuJoCo's path jumps; why: in words.
+    right: "both", "mjwrap", "MuJoCo", "neither", "-" (not compared), or "mjwrap in motion": both are right at every
+    single pose, but MuJoCo's path jumps from pose to pose. why: the reason, in words.
     """
 
     right: str
@@ -27,7 +27,9 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
     if summary.native_only:
         seen = _native_faults(summary, summary.poses, set(Fault))
         told = "; ".join(part for part in (seen, _jumps(jumps, "MuJoCo")) if part)
-        return Verdict("-", f"stays with MuJoCo: {summary.native_only}" + (f". There {told}" if told else ""))
+        return Verdict(
+            "-", f"stays with MuJoCo: {summary.native_only}" + (f". MuJoCo's path: {told}" if told else "")
+        )
     counts, poses = summary.counts, summary.poses
     own_jumps, native_jumps = _jumps(jumps, "mjwrap"), _jumps(jumps, "MuJoCo")
     if summary.at_fault or own_jumps:
@@ -41,14 +43,14 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
     if native_jumps:
         smooth = all(jump.other_smooth for jump in jumps if jump.program == "MuJoCo")
         parts.append(
-            f"{native_jumps}, where mjwrap's path {'goes on smoothly' if smooth else 'goes on or ends'}"
+            f"{native_jumps}, where mjwrap's path {'continues smoothly' if smooth else 'continues or ends'}"
         )
     if counts[Outcome.OTHER_BRANCH.name]:
         longer = "longer" if summary.longer_branch > 0.0 else "shorter"
         parts.append(
-            f"at {counts[Outcome.OTHER_BRANCH.name]} of {poses} poses the two go round the cylinder another way, each "
-            f"a true geodesic there (mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer}): MuJoCo "
-            "chooses the side anew at every pose, mjwrap keeps it along a sweep, as a string cannot pass through the "
+            f"at {counts[Outcome.OTHER_BRANCH.name]} of {poses} poses the two go round the cylinder in different ways, "
+            f"both true geodesics (mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer}): MuJoCo chooses "
+            "the side anew at every pose; mjwrap keeps it along a sweep, because a string cannot pass through the "
             "cylinder"
         )
     right = "mjwrap in motion" if native_jumps else "both"
@@ -57,7 +59,7 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
     if counts[Outcome.AGREE.name]:
         length, velocity, arm = summary.agreement
         parts.append(
-            f"equal at {counts[Outcome.AGREE.name]} of {poses} poses, to {length:.0e} m, {velocity:.0e} m/s, "
+            f"equal at {counts[Outcome.AGREE.name]} of {poses} poses, within {length:.0e} m, {velocity:.0e} m/s, "
             f"{arm:.0e} m/rad"
         )
     if no_path:
@@ -67,18 +69,18 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
 
 
 def _native_faults(summary: MuscleSummary, poses: int, kinds: set[Fault]) -> str:
-    """Say what was wrong with MuJoCo's path, by kind and geom."""
+    """Return the faults of MuJoCo's path as text, by kind and geom."""
     told = []
     for (fault, geom), count in summary.faults.most_common():
         if fault in kinds:
             at = f" (geom '{geom}')" if geom else ""
             words = fault.words.format(summary.measures[fault, geom])
-            told.append(f"MuJoCo's path is no geodesic at {count} of {poses} poses{at}: {words}")
+            told.append(f"MuJoCo's path is not a geodesic at {count} of {poses} poses{at}: {words}")
     return "; ".join(told)
 
 
 def _own_faults(summary: MuscleSummary) -> str:
-    """Say what was wrong with mjwrap's path."""
+    """Return the faults of mjwrap's path as text."""
     told = []
     failed = summary.counts[Outcome.MJWRAP_FAILED.name]
     if failed:
@@ -89,22 +91,22 @@ def _own_faults(summary: MuscleSummary) -> str:
     sides = summary.counts[Outcome.WRONG_SIDE.name]
     if sides:
         told.append(
-            f"at {counted(sides, 'pose')} mjwrap starts on the side of the cylinder that is away from its side site"
+            f"at {counted(sides, 'pose')} mjwrap starts on the side of the cylinder opposite to its side site"
         )
     for words, count in summary.own_faults.most_common(3):
-        told.append(f"mjwrap's path is no geodesic at {counted(count, 'pose')}: {words}")
+        told.append(f"mjwrap's path is not a geodesic at {counted(count, 'pose')}: {words}")
     unexplained = summary.counts[Outcome.UNEXPLAINED.name]
     if unexplained:
         length, velocity, arm = summary.agreement
         told.append(
-            f"at {counted(unexplained, 'pose')} both are judged the same geodesic, but differ by up to {length:.0e} m, "
-            f"{velocity:.0e} m/s, {arm:.0e} m/rad"
+            f"at {counted(unexplained, 'pose')} both are judged to be the same geodesic, but differ by up to "
+            f"{length:.0e} m, {velocity:.0e} m/s, {arm:.0e} m/rad"
         )
     return "; ".join(told)
 
 
 def _jumps(jumps: Sequence[Jump], program: str) -> str:
-    """Say how often and how far a program's path jumps."""
+    """Return the number and size of the jumps of a program's path as text."""
     own = [jump for jump in jumps if jump.program == program]
     if not own:
         return ""

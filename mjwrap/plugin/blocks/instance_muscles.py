@@ -1,4 +1,4 @@
-"""Reads the muscles of instances of the plugin, from a model that Python has or from one at an address."""
+"""Read the muscles of instances of the plugin, from a model in Python or from a model at an address."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from mjwrap.plugin.mujoco_c.copies import copy_of
 from mjwrap.plugin.spec.configuration import TRANSMISSION, Configuration, configuration_at
 from mjwrap.plugin.spec.tendons import restore_tendons
 
-_COPY = threading.Lock()  # held while the copy of a model is read
+_COPY = threading.Lock()  # locked while the copy of a model is read
 _here = threading.local()  # .reading: this thread reads the copy of a model
 
 
 class Copy(NamedTuple):
-    """A copy of a model, muscles of it, and their arrays."""
+    """A copy of a model, its muscles, and their arrays."""
 
     model: mujoco.MjModel
     plan: Plan
@@ -30,9 +30,9 @@ class Copy(NamedTuple):
 
 
 def read_muscles(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Plan, list[MuscleDeclaration]]:
-    """Return the named muscles of a model and their arrays; `ModelError` where one is missing.
+    """Return the named muscles of a model and their arrays; `ModelError` if one is missing.
 
-    Undoes in `model` what `install` changed there for MuJoCo's sake, but for the disabled actuators.
+    Undoes the changes of `install` in `model`, except for the disabled actuators.
     """
     marks.zero_disabled_ranges(model)
     restore_tendons(model)
@@ -42,7 +42,7 @@ def read_muscles(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Pl
     missing = [name for name in names if name not in declared]
     if missing:
         raise ModelError(
-            f"the model has no muscle '{missing[0]}' any more, which install gave to the engine plugin; muscles: "
+            f"the model no longer has the muscle '{missing[0]}', which install gave to the engine plugin; muscles: "
             f"{', '.join(declared) or 'none'}; call install again"
         )
     muscles = [declared[name] for name in names]
@@ -51,13 +51,13 @@ def read_muscles(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Pl
 
 @contextmanager
 def copy_read(address: int, configuration: Configuration) -> Iterator[Copy]:
-    """Give a copy of the model at an address, its muscles and their arrays, for the length of a with block."""
+    """Yield a copy of the model at an address, its muscles and their arrays; it is valid inside the with block."""
     with _COPY:
         yield _read_copy(address, configuration)
 
 
 def is_reading() -> bool:
-    """Return whether this thread reads the copy of a model, for which MuJoCo makes an mjData of its own."""
+    """Return whether this thread is reading the copy of a model, for which MuJoCo makes an mjData of its own."""
     return getattr(_here, "reading", False)
 
 

@@ -1,14 +1,14 @@
-"""Keeps the muscles' arrays equal to the mjModel: a number changed there counts from the next evaluation on.
+"""Keep the muscles' arrays equal to the mjModel: a changed number takes effect at the next evaluation.
 
-MuJoCo's own muscle law and the limits of controls are compared with the model where the kernels read them, which costs
-no memory but the model's; `drives` says which actuator is whose. Of the rest the block keeps a copy of what the
-muscles' arrays were made from, in lists of regions (offset of the pointer in mjModel, first byte, how many):
+The parameters of MuJoCo's own muscle law and the limits of controls are compared in place, without a copy; `drives`
+gives the actuator of each muscle. For all other numbers the block has a copy of the parts of the model from which the
+muscles' arrays were made, in lists of regions (offset of the pointer in mjModel, first byte, count):
 
-- plain: doubles that stand in the muscles' arrays as they are, copied there by the rows of `bound`;
-- derived: doubles that mean something else there: then Python builds the arrays anew;
-- structure: bytes of ids and kinds, looked at only when another model comes, as in `rollout` over a list of models.
+- plain: doubles that the muscles' arrays contain unchanged; the rows of `bound` copy them;
+- derived: doubles from which the arrays are computed; if one changes, Python computes the arrays again;
+- structure: bytes of ids and kinds, compared only when another model is used, as in `rollout` over a list of models.
 
-`mjwrap/plugin/blocks/watch.py` makes the lists.
+`mjwrap/plugin/blocks/model_changes.py` makes the lists.
 """
 
 from __future__ import annotations
@@ -18,15 +18,22 @@ from mjwrap.kernels.musculotendon.dispatch import PARAMS
 from mjwrap.mjcf.marks import COLUMN
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import call, octets, reals, store_word, word, words
+from mjwrap.plugin.callbacks.memory import (
+    call,
+    float64_array,
+    int64_array,
+    read_int64,
+    uint8_array,
+    write_int64,
+)
 
-# columns of a list of regions, and of `bound`: as a region, then which array of the block, and which number in it
+# columns of a list of regions; `bound` also has the array of the block, and the number in it
 POINTER, FIRST, COUNT, ARRAY, NUMBER = 0, 1, 2, 3, 4
 REGION, BINDING = 3, 5
-# columns of `drives` (n, 4): a muscle's actuator and its output, -1 where its law is not MuJoCo's; what is followed
+# columns of `drives` (n, 4): a muscle's actuator and its output, -1 if its law is not MuJoCo's; what is compared
 D_ACTUATOR, D_OUTPUT, D_FOLLOWS, DRIVE = 0, 1, 2, 4
-BIAS, CONTROL = 1, 2  # bits: biasprm; the limits of its control
-# `pointers` (6, 2): offsets in mjModel of the pointers to these arrays, and how many numbers they hold
+BIAS, CONTROL = 1, 2  # bits of D_FOLLOWS: biasprm; the limits of its control
+# `pointers` (6, 2): offsets in mjModel of the pointers to these arrays, and the arrays' sizes
 POINTERS = (
     "actuator_gainprm", "actuator_biasprm", "actuator_lengthrange", "actuator_acc0", "actuator_gear",
     "actuator_ctrlrange",
@@ -36,18 +43,18 @@ PRM, GEARS = 10, 6  # numbers in a row of gainprm and biasprm, and of gear
 
 @jit
 def _table(block, which, rows, columns):
-    return words(block + word(block + 8 * which), (word(block + 8 * rows), columns))
+    return int64_array(block + read_int64(block + 8 * which), (read_int64(block + 8 * rows), columns))
 
 
 @jit
 def _differs(block, which, seen, rows, model):
     """Return whether doubles in a list of regions have changed."""
     regions = _table(block, which, rows, REGION)
-    at = block + word(block + 8 * seen)
+    at = block + read_int64(block + 8 * seen)
     for r in range(regions.shape[0]):
         count = regions[r, COUNT]
-        live = words(word(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
-        kept = words(at, (count,))
+        live = int64_array(read_int64(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
+        kept = int64_array(at, (count,))
         changes = 0
         for i in range(count):
             changes |= live[i] ^ kept[i]
@@ -59,14 +66,14 @@ def _differs(block, which, seen, rows, model):
 
 @jit
 def _living(block, model, which):
-    """Return an array of the model in `pointers`, flat, as words."""
-    pointers = words(block + word(block + 8 * bk.A_POINTERS), (6, 2))
-    return words(word(model + pointers[which, 0]), (pointers[which, 1],))
+    """Return a flat array of the model, given by its row in `pointers`, as 64-bit integers."""
+    pointers = int64_array(block + read_int64(block + 8 * bk.A_POINTERS), (6, 2))
+    return int64_array(read_int64(model + pointers[which, 0]), (pointers[which, 1],))
 
 
 @jit
 def _match(live, at, mine, to, count):
-    """Return in which bits words of two arrays differ."""
+    """Return the bits in which integers of two arrays differ."""
     changes = 0
     for i in range(count):
         changes |= live[at + i] ^ mine[to + i]
@@ -81,16 +88,16 @@ def _copy(live, at, mine, to, count):
 
 @jit
 def _laws(block, model):
-    """Make MuJoCo's muscle laws and the limits of controls the model's.
+    """Copy MuJoCo's muscle laws and the limits of controls from the model, where they differ.
 
-    Limits of force are the marks in gainprm and biasprm (`mjcf/marks.py`). All numbers as words, to the bit.
+    Limits of force are the marks in gainprm and biasprm (`mjcf/marks.py`). All numbers are compared bit by bit.
     """
-    n = word(block + 8 * bk.MUSCLES)
-    drives = words(block + word(block + 8 * bk.A_DRIVES), (n, DRIVE))
-    control = words(block + word(block + 8 * bk.A_CONTROL), (n,))
-    params = words(block + word(block + 8 * bk.A_PARAMS), (n * PARAMS,))
-    low = words(block + word(block + 8 * bk.A_CTRL_LOW), (n,))
-    high = words(block + word(block + 8 * bk.A_CTRL_HIGH), (n,))
+    n = read_int64(block + 8 * bk.MUSCLES)
+    drives = int64_array(block + read_int64(block + 8 * bk.A_DRIVES), (n, DRIVE))
+    control = int64_array(block + read_int64(block + 8 * bk.A_CONTROL), (n,))
+    params = int64_array(block + read_int64(block + 8 * bk.A_PARAMS), (n * PARAMS,))
+    low = int64_array(block + read_int64(block + 8 * bk.A_CTRL_LOW), (n,))
+    high = int64_array(block + read_int64(block + 8 * bk.A_CTRL_HIGH), (n,))
     gain, bias, lengths = _living(block, model, 0), _living(block, model, 1), _living(block, model, 2)
     acc0, gear, limits = _living(block, model, 3), _living(block, model, 4), _living(block, model, 5)
     for m in range(n):
@@ -130,11 +137,11 @@ def _laws(block, model):
 def _other_structure(block, model):
     """Return whether another model has other ids or kinds."""
     regions = _table(block, bk.A_STRUCTURE, bk.STRUCTURE, REGION)
-    at = block + word(block + 8 * bk.A_STRUCTURE_SEEN)
+    at = block + read_int64(block + 8 * bk.A_STRUCTURE_SEEN)
     for r in range(regions.shape[0]):
         count = regions[r, COUNT]
-        live = octets(word(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
-        kept = octets(at, (count,))
+        live = uint8_array(read_int64(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
+        kept = uint8_array(at, (count,))
         for i in range(count):
             if live[i] != kept[i]:
                 return True
@@ -144,13 +151,13 @@ def _other_structure(block, model):
 
 @jit
 def _note(block, which, seen, rows, size, model):
-    """Keep what the model holds now in a list of regions; size [bytes] of what they count."""
+    """Store the present contents of a list of regions; size: bytes of a number."""
     regions = _table(block, which, rows, REGION)
-    at = block + word(block + 8 * seen)
+    at = block + read_int64(block + 8 * seen)
     for r in range(regions.shape[0]):
         count = size * regions[r, COUNT]
-        live = octets(word(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
-        kept = octets(at, (count,))
+        live = uint8_array(read_int64(model + regions[r, POINTER]) + regions[r, FIRST], (count,))
+        kept = uint8_array(at, (count,))
         for i in range(count):
             kept[i] = live[i]
         at += count
@@ -158,28 +165,30 @@ def _note(block, which, seen, rows, size, model):
 
 @jit
 def _bind(block, model):
-    """Copy the plain numbers of the model to where the kernels read them."""
+    """Copy the plain numbers of the model to the muscles' arrays."""
     bound = _table(block, bk.A_BOUND, bk.BOUND, BINDING)
     for r in range(bound.shape[0]):
         count = bound[r, COUNT]
-        live = reals(word(model + bound[r, POINTER]) + bound[r, FIRST], (count,))
-        place = reals(block + word(block + 8 * bound[r, ARRAY]) + 8 * bound[r, NUMBER], (count,))
+        live = float64_array(read_int64(model + bound[r, POINTER]) + bound[r, FIRST], (count,))
+        place = float64_array(
+            block + read_int64(block + 8 * bound[r, ARRAY]) + 8 * bound[r, NUMBER], (count,)
+        )
         for i in range(count):
             place[i] = live[i]
 
 
 @jit
-def follow(block, model):
-    """Make the muscles' arrays those of the model as it is now."""
-    other = word(block + 8 * bk.MODEL) != model
+def sync_with_model(block, model):
+    """Update the muscles' arrays to the present model."""
+    other = read_int64(block + 8 * bk.MODEL) != model
     _laws(block, model)
     plain = _differs(block, bk.A_PLAIN, bk.A_PLAIN_SEEN, bk.PLAIN, model)
     derived = _differs(block, bk.A_DERIVED, bk.A_DERIVED_SEEN, bk.DERIVED, model)
     if not (plain or derived or other):
         return
-    store_word(block + 8 * bk.MODEL, model)
+    write_int64(block + 8 * bk.MODEL, model)
     if derived or (other and _other_structure(block, model)):
-        call(word(block + 8 * bk.REBUILD), block, model, word(block + 8 * bk.INSTANCE))
+        call(read_int64(block + 8 * bk.REBUILD), block, model, read_int64(block + 8 * bk.INSTANCE))
         _note(block, bk.A_DERIVED, bk.A_DERIVED_SEEN, bk.DERIVED, 8, model)
         _note(block, bk.A_STRUCTURE, bk.A_STRUCTURE_SEEN, bk.STRUCTURE, 1, model)
     if plain:

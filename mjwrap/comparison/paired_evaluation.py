@@ -1,4 +1,4 @@
-"""The same poses in MuJoCo's tendons and in mjwrap: lengths, velocities, moment arms, and each path judged."""
+"""Evaluate MuJoCo's tendons and mjwrap's paths at the same poses: lengths, velocities, moment arms, judgements."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.judge_geodesic import ANGLE, HELD, Fault, judge, judge_held
+from mjwrap.comparison.judge_geodesic import ANGLE, INSIDE_TOLERANCE, Fault, judge, judge_held
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
+from mjwrap.poses.continuation import PathFollower, SweepTrace
 from mjwrap.poses.joint_sweeps import PoseSequence
-from mjwrap.poses.walking import Walk, Walker
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-LENGTH = 1e-9  # [m] largest difference of a path's length from the sum of its own parts
+LENGTH = 1e-9  # [m] largest difference of a path's length from the sum of its parts
 
 
 @dataclass
 class PathRecord:
     """One program's path of one muscle over a motion, (T,) each, and its judgement.
 
-    length [m], velocity [m/s], jacobian (T, nv) ∂l/∂q; fault: `Fault` of the worst span, measure, span: which one;
-    turns (T, spans) [rad]: the branch, see `geometry.Judgement`; touched (T, spans);
-    hinted (T, spans): whether it passes a cylinder on the side of its side site, or there is none.
+    length [m], velocity [m/s], jacobian (T, nv) ∂l/∂q; fault: `Fault` of the worst span, measure: of this fault, span:
+    index of this span; turns (T, spans) [rad]: the branch, see `judge_geodesic.Judgement`; touched (T, spans);
+    hinted (T, spans): whether it passes a cylinder on the side of its side site, true if it has no side site.
     """
 
     length: Array
@@ -42,7 +42,7 @@ class PathRecord:
     hinted: NDArray[np.bool_]
 
 
-class _Pair(NamedTuple):
+class _ComparedMuscle(NamedTuple):
     """A muscle to compare: name, index in the MuscleSystem or -1, tendon, spans."""
 
     name: str
@@ -52,10 +52,10 @@ class _Pair(NamedTuple):
 
 
 @dataclass
-class Twin:
+class MusclePair:
     """One muscle in both programs over a motion.
 
-    index: in the `MuscleSystem`; status (T,): mjwrap's. A muscle that stays native has index -1 and no mjwrap.
+    index: in the `MuscleSystem`; status (T,): of mjwrap. A muscle that stays with MuJoCo has index -1, mjwrap None.
     """
 
     name: str
@@ -69,42 +69,42 @@ class Twin:
 
 @dataclass
 class Batch:
-    """All compared muscles over one motion; walk: all of mjwrap's."""
+    """All compared muscles over one motion; trace: of all muscles of mjwrap."""
 
     motion: PoseSequence
-    walk: Walk
-    twins: list[Twin] = field(default_factory=list)
+    trace: SweepTrace
+    pairs: list[MusclePair] = field(default_factory=list)
 
 
 class Comparer:
-    """Evaluates motions with both programs.
+    """Evaluate motions with both programs.
 
-    muscles: a `MuscleSystem`; wanted: names of the muscles to compare, those that stay native among them. Those whose
-    mjwrap route is not that of their tendon, and those without a spatial tendon, are left out and named in `left_out`
-    with the reason.
+    muscles: a `MuscleSystem`; wanted: names of the muscles to compare, also of muscles that stay with MuJoCo. Muscles
+    whose route in mjwrap differs from their tendon, and muscles without a spatial tendon, are left out; `left_out` has
+    their names and the reasons.
     """
 
     def __init__(self, muscles: MuscleSystem, wanted: Sequence[str]) -> None:
         self.muscles, self.model = muscles, muscles.model
-        # Native kinematics need no contacts and no forces; a copy keeps the caller's options as they are.
+        # MuJoCo's tendons need no contacts and no constraints; a copy leaves the caller's options unchanged.
         self._native = copy.copy(self.model)
         off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._native.opt.disableflags |= int(off)
         self._native_data = mujoco.MjData(self._native)
         mujoco.mj_kinematics(self._native, self._native_data)
         self.data = mujoco.MjData(self.model)
-        self.walker = Walker(muscles, self.data)
+        self.follower = PathFollower(muscles, self.data)
         self.left_out: dict[str, str] = {}
-        self._pairs: list[_Pair] = []
+        self._selected: list[_ComparedMuscle] = []
         for name in wanted:
-            found = self._pair(name)
+            found = self._compared(name)
             if isinstance(found, str):
                 self.left_out[name] = found
             else:
-                self._pairs.append(found)
+                self._selected.append(found)
 
-    def _pair(self, name: str) -> _Pair | str:
-        """Return what to compare for a muscle, or why nothing can be."""
+    def _compared(self, name: str) -> _ComparedMuscle | str:
+        """Return the muscle to compare, or the reason why it cannot be compared."""
         model = self.model
         if name in self.muscles.names:
             index = self.muscles.index(name)
@@ -113,27 +113,27 @@ class Comparer:
                 return "it has no tendon in MuJoCo"
             own = muscle_spans(declared)
             if own is None or own != tendon_spans(model, self._native_data, declared.tendon):
-                return "its tendon is a placeholder: mjwrap's route is another one"
-            return _Pair(name, index, declared.tendon, own)
+                return "its tendon is a placeholder: mjwrap's route is different"
+            return _ComparedMuscle(name, index, declared.tendon, own)
         actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if actuator < 0 or int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
             return "it has no spatial tendon"
         tendon = int(model.actuator_trnid[actuator, 0])
         spans = tendon_spans(model, self._native_data, tendon)
-        return _Pair(name, -1, tendon, spans) if spans else "it has no spatial tendon"
+        return _ComparedMuscle(name, -1, tendon, spans) if spans else "it has no spatial tendon"
 
     def evaluate(self, motion: PoseSequence, start: Array | None = None) -> Batch:
-        """Evaluate all poses of a motion; start (nq,): where a continuous one comes from, with its branch."""
+        """Evaluate all poses of a motion; start (nq,): pose from which a continuous motion takes its branches."""
         count, nv = len(motion.at), self.model.nv
         native, mine = _Numbers(count, self.model.ntendon, nv), _Numbers(count, self.muscles.n, nv)
         wraps = WrapRecord(self.model, count)
         contacts: list[dict[int, Array]] = []
         geoms = _Frames(count, self.model)
-        taken = [pair.index for pair in self._pairs if pair.index >= 0]
+        taken = [muscle.index for muscle in self._selected if muscle.index >= 0]
         branches: list[Array] = []
         self.muscles.reset(self.data)
         if motion.continuous and start is not None:
-            self.walker.come(start, motion.qpos[0])
+            self.follower.move_to(start, motion.qpos[0])
         for k in range(count):
             native.keep(k, *self.native_at(motion.qpos[k], motion.qvel[k]))
             wraps.keep(k, self._native_data)
@@ -144,10 +144,10 @@ class Comparer:
             contacts.append({i: self.muscles.contact_points(i) for i in taken})
             branches.append(self.muscles.branch(self.data))
         slopes = np.einsum("tnv,tv->tn", mine.jacobian, motion.tangent)
-        batch = Batch(motion, Walk(motion.at, mine.length, slopes, mine.status == 0, branches))
-        for name, index, tendon, spans in self._pairs:
+        batch = Batch(motion, SweepTrace(motion.at, mine.length, slopes, mine.status == 0, branches))
+        for name, index, tendon, spans in self._selected:
             points = wraps.points(tendon, spans)
-            record = self._record(spans, points, geoms, HELD, *native.of(tendon))
+            record = self._record(spans, points, geoms, INSIDE_TOLERANCE, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)
             if index >= 0:
                 own = [_own_points(at) for at in points]
@@ -156,7 +156,7 @@ class Comparer:
                     self._record(spans, own, geoms, ANGLE, *mine.of(index)),
                     mine.status[:, index],
                 )
-            batch.twins.append(Twin(name, index, tendon, spans, record, own_record, status))
+            batch.pairs.append(MusclePair(name, index, tendon, spans, record, own_record, status))
         return batch
 
     def native_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array]:
@@ -171,7 +171,7 @@ class Comparer:
         return data.ten_length.copy(), data.ten_velocity.copy(), rows
 
     def mjwrap_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array, Ints]:
-        """Return mjwrap's lengths (n,), velocities, ∂l/∂q (n, nv) and status at a state, from where it stands."""
+        """Return mjwrap's lengths (n,), velocities, ∂l/∂q (n, nv) and status at a state, from its present branches."""
         self.data.qpos[:], self.data.qvel[:] = qpos, qvel
         jacobian = self.muscles.length_jacobian(self.data)
         muscles = self.muscles
@@ -210,14 +210,14 @@ class Comparer:
 
 
 class _Frames:
-    """Where geoms and sites were, over `count` poses: centre (T, ngeom, 3), rotation (T, ngeom, 3, 3), sites."""
+    """The poses of geoms and sites over `count` poses: centre (T, ngeom, 3), rotation (T, ngeom, 3, 3), sites."""
 
     def __init__(self, count: int, model: mujoco.MjModel) -> None:
         self.centre, self.rotation = np.zeros((count, model.ngeom, 3)), np.zeros((count, model.ngeom, 3, 3))
         self.sites = np.zeros((count, model.nsite, 3))
 
     def keep(self, k: int, data: mujoco.MjData) -> None:
-        """Keep pose k."""
+        """Store pose k."""
         self.centre[k], self.rotation[k] = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
         self.sites[k] = data.site_xpos
 
@@ -246,7 +246,7 @@ class _Numbers:
 
 
 def _sparse(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.int32], ...]:
-    """Return row counts, row starts and columns of ten_J, which moved from data to model."""
+    """Return row counts, row starts and columns of ten_J; in newer MuJoCo they are in the model."""
     home = model if hasattr(model, "ten_J_rownnz") else data
     return home.ten_J_rownnz, home.ten_J_rowadr, home.ten_J_colind.reshape(-1)
 
@@ -254,7 +254,7 @@ def _sparse(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.int3
 def _in_frame(
     model: mujoco.MjModel, geom: int, geoms: _Frames, at: SpanPoints
 ) -> tuple[bool, float, Array, Array, NDArray[np.bool_], Array, Array]:
-    """Return what `judge` asks for: kind, radius, and the points in the geom's frame."""
+    """Return the arguments of `judge`: kind, radius, and the points in the geom's frame."""
     a, b, p, q = (geoms.local(geom, x) for x in (at.a, at.b, at.p, at.q))
     cylinder = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
     return cylinder, float(model.geom_size[geom, 0]), a, b, at.touched, p, q
@@ -274,7 +274,7 @@ def _assign(
     model: mujoco.MjModel,
     geoms: _Frames,
 ) -> None:
-    """Give every contact pair (k, 2, 3) of mjwrap to the span that it fits best, in order."""
+    """Assign every contact pair (k, 2, 3) of mjwrap to the span that it fits best, in order."""
     for t, contacts in enumerate(pairs):
         free = [s for s, span in enumerate(spans) if span.geom >= 0]
         for pair in contacts:
@@ -284,7 +284,7 @@ def _assign(
 
 
 def _misfit(span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geoms: _Frames, t: int) -> float:
-    """Return how far two contact points are off a span's surface and tangents [m]."""
+    """Return the distance of two contact points from a span's surface and tangents [m]."""
     rotation, centre, radius = (
         geoms.rotation[t, span.geom],
         geoms.centre[t, span.geom],
