@@ -28,7 +28,6 @@ import mujoco
 import numpy as np
 
 COLUMN = 9  # the last of gainprm, biasprm and dynprm
-PLUGIN_NAME = "mjwrap.muscles"  # of the engine plugin
 PLUGIN_INSTANCE = "mjwrap"  # of its instance, behind the prefix of the model that it was attached with
 # force range [N] of a disabled actuator in an MjSpec: the compiler accepts no 0 to 0, to_xml writes nothing smaller,
 # and a muscle's force is never positive, so it is clamped to zero

@@ -1,8 +1,6 @@
 """The engine plugin: plain `mj_step`, the viewer, `rollout` and `batch` run the muscles, with no Python in the loop."""
 
-from mjwrap.plugin.installing import install, load
-from mjwrap.plugin.muscles import Muscles
-from mjwrap.plugin.native import native
-from mjwrap.plugin.readout import Readout, excitations, read
+import lazy_loader
 
-__all__ = ["Muscles", "Readout", "excitations", "install", "load", "native", "read"]
+# `import mjwrap` imports this package, to announce the plugin, and shall cost next to nothing.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,11 +12,10 @@ from urllib.parse import quote, unquote
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.marks import PLUGIN_INSTANCE, PLUGIN_NAME, is_own_instance
+from mjwrap.mjcf.marks import PLUGIN_INSTANCE, is_own_instance
 from mjwrap.plugin.mujoco_c.library import library
+from mjwrap.plugin.mujoco_c.registration import ATTRIBUTES, MODE, MUSCLES, NUMBERS, PLUGIN_NAME
 
-MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"
-ATTRIBUTES = (MUSCLES, NUMBERS, MODE)
 WRENCH, TRANSMISSION = "wrench", "transmission"
 MODES = (WRENCH, TRANSMISSION)
 
