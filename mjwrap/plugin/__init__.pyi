@@ -6,3 +6,4 @@ from .readout import Readout as Readout
 from .readout import excitations as excitations
 from .readout import read as read
 from .registering import register as register
+from .uninstalling import without_plugin as without_plugin

@@ -21,7 +21,7 @@ from mjwrap.plugin.mujoco_c.offsets import offsets
 from mjwrap.plugin.mujoco_c.probe import verify_plugin_fields
 from mjwrap.plugin.mujoco_c.registration import PLUGIN_NAME, add_callbacks
 from mjwrap.plugin.mujoco_c.visualisation import drawing
-from mjwrap.plugin.spec.configuration import configuration_at
+from mjwrap.plugin.spec.configuration import configuration_at, is_idle
 
 _LOCK = threading.RLock()
 _here = threading.local()  # .error: why a callback of this thread failed last
@@ -82,7 +82,7 @@ def initialise(model: int, data: int, instance: int) -> int:
     slots = ctypes.c_uint64.from_address(data + offsets().data["plugin_data"]).value
     slot = ctypes.c_uint64.from_address(slots + 8 * instance)
     slot.value = 0
-    if is_reading():
+    if is_reading() or is_idle(model, instance):
         return 0
     try:
         slot.value = give_block(model, data, instance)

@@ -35,7 +35,7 @@ class Evaluator(Results):
         if has_plugin(model):
             raise ModelError(
                 "mjwrap's engine plugin drives the muscles of this model already (install): mj_step moves it, and "
-                "mjwrap.plugin.read(data) reads it; for a MuscleSystem compile a spec without the plugin"
+                "mjwrap.plugin.read(data) reads it; for a MuscleSystem take mjwrap.plugin.without_plugin(model)"
             )
         self.strict = strict
         self._takeover = Takeover(model)
