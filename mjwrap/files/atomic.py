@@ -5,7 +5,6 @@ import os
 import signal
 import stat
 import threading
-import uuid
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from mjwrap.errors import RecordingError
+from mjwrap.files.leftovers import part_name, remove_leftovers
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,8 +26,8 @@ class PartFile:
     """A temporary file beside `path`, created empty at once, so that an unwritable place shows before a run.
 
     `part` is written to; `publish` gives it the name `path` in one step, which replaces an older file of that name;
-    `discard` removes it. Until then an existing `path` stays as it is. `option` is what the place was given by,
-    for messages.
+    `discard` removes it. Until then an existing `path` stays as it is. What killed processes have left in the folder is
+    removed first. `option` is what the place was given by, for messages.
 
     Raises RecordingError where `path` ends in none of the suffixes, names something other than a regular file, may
     not be overwritten, or lies in a folder that is missing or cannot be written.
@@ -44,8 +44,8 @@ class PartFile:
                 f"cannot write {self._named}: the name must end in {' or '.join(suffixes)}, by which programs "
                 f"know what it is; for example '{example}'"
             )
-        unique = f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
-        self.part = self.path.with_name(f".{self.path.stem}.{unique}.part{self.path.suffix}")
+        remove_leftovers(self.path.parent)
+        self.part = self.path.with_name(part_name(self.path))
         try:
             fault = self._overwrite_fault()
             if not fault:
