@@ -7,6 +7,8 @@ from typing import Any
 
 import lazy_loader
 
+from mjwrap.plugin.announcing import announce_with_mujoco
+
 __version__ = "0.1.0"
 
 _load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
@@ -17,3 +19,6 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'mjwrap' has no attribute {name!r}; it has: {', '.join(__all__)}")
     return _load(name)
+
+
+announce_with_mujoco()

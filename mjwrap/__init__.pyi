@@ -53,6 +53,7 @@ from .paths import solve_path as solve_path
 from .paths import solve_sweep as solve_sweep
 from .plugin import install as install
 from .plugin import load as load
+from .plugin import register as register
 from .recording import Recorder as Recorder
 from .surfaces import Capsule as Capsule
 from .surfaces import Cone as Cone

@@ -5,7 +5,6 @@ import os
 import signal
 import stat
 import threading
-import uuid
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from mjwrap.errors import RecordingError
+from mjwrap.files.leftovers import part_name, remove_leftovers
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,8 +26,8 @@ class PartFile:
     """A temporary file beside `path`, created at once, so that a place that cannot be written is noticed before a run.
 
     `part` is the file to write; `publish` gives it the name `path` in one step, replacing an older file of that name;
-    `discard` removes it. Until then an existing `path` is unchanged. option: the name of the option that gave the path,
-    for messages.
+    `discard` removes it. Until then an existing `path` is unchanged. Parts that killed processes have left in the
+    folder are removed first. option: the name of the option that gave the path, for messages.
 
     Raises RecordingError if `path` has none of the suffixes, is not a regular file, may not be overwritten, or lies in
     a folder that does not exist or cannot be written.
@@ -44,8 +44,8 @@ class PartFile:
                 f"cannot write {self._named}: the name must end in {' or '.join(suffixes)}, which tells programs "
                 f"its format; for example '{example}'"
             )
-        unique = f"{os.getpid()}-{uuid.uuid4().hex[:8]}"
-        self.part = self.path.with_name(f".{self.path.stem}.{unique}.part{self.path.suffix}")
+        remove_leftovers(self.path.parent)
+        self.part = self.path.with_name(part_name(self.path))
         try:
             fault = self._overwrite_fault()
             if not fault:

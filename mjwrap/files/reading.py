@@ -6,10 +6,11 @@ import csv
 import io
 import math
 import os
-import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mjwrap.errors import TableError
 from mjwrap.files.table import SUFFIXES, Table, check_names
@@ -75,7 +76,7 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
     table = _table(name, header, [(i, line.split()) for i, line in rest[1:]], metadata, finite)
     for keys, found in ((("nRows", "datarows"), len(table.time)), (("nColumns", "datacolumns"), len(header))):
         said = next((metadata[key] for key in keys if key in metadata), str(found))
-        if not said.isdigit() or int(said) != found:
+        if not said.isdecimal() or int(said) != found:
             raise TableError(
                 f"'{name}': its header says {keys[0]}={said}, but there are {found}: is it cut short?"
             )
@@ -132,27 +133,41 @@ def _numbers(name: str, line: int, header: list[str], row: list[str], finite: bo
 
 def _read_npz(name: str) -> Table:
     try:
-        with np.load(name, allow_pickle=False) as file:
+        whole = io.BytesIO(Path(name).read_bytes())  # NumPy leaves a damaged file open
+        with np.load(whole, allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
     except OSError as error:
         raise TableError(f"cannot read '{name}': {(error.strerror or str(error)).lower()}") from None
-    except (ValueError, zipfile.BadZipFile, EOFError, AttributeError) as error:
-        raise TableError(f"'{name}' is not an NPZ file of plain arrays: {error}") from None
+    except Exception as error:  # zipfile, zlib and numpy raise some dozen kinds for a damaged file
+        why = str(error) or type(error).__name__
+        raise TableError(f"'{name}' is damaged, or not an NPZ file of plain arrays: {why}") from None
     if "time" not in arrays:
         raise TableError(f"'{name}' has no array 'time' [s]; its arrays: {', '.join(arrays) or 'none'}")
-    time = arrays.pop("time")
+    time = _numeric(name, "time", arrays.pop("time"), (None,))
+    if not time.size:
+        raise TableError(f"'{name}': array 'time' is empty")
     metadata = {key[9:]: str(arrays.pop(key)) for key in list(arrays) if key.startswith("metadata.")}
     if {"columns", "values"} <= arrays.keys():
-        values, names = arrays["values"], tuple(str(cell) for cell in np.atleast_1d(arrays["columns"]))
+        names = [str(cell) for cell in arrays["columns"].ravel()]
+        values = _numeric(name, "values", arrays["values"], (len(time), len(names)))
     else:
         names, columns = [], []
         for key, array in arrays.items():
-            if array.ndim not in (1, 2) or array.shape[0] != time.shape[0] or array.dtype.kind not in "fiub":
-                what = f"{array.dtype} of shape {array.shape}"
-                raise TableError(
-                    f"'{name}': array '{key}' is {what}; wanted: numbers, a row for each of {time.shape}"
-                )
+            numbers = _numeric(name, key, array, (len(time), None)[: max(array.ndim, 1)])
             names += [key] if array.ndim == 1 else [f"{key}[{i}]" for i in range(array.shape[1])]
-            columns.append(array.reshape(len(array), -1))
+            columns.append(numbers.reshape(len(time), -1))
         values = np.hstack(columns) if columns else np.empty((time.shape[0], 0))
     return Table(time, tuple(names), values, metadata, name)
+
+
+def _numeric(name: str, key: str, array: NDArray[Any], shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Return an array of a file as numbers, if it has a shape, in which None is any length."""
+    fits = len(array.shape) == len(shape) and all(
+        wanted in (None, n) for n, wanted in zip(array.shape, shape, strict=True)
+    )
+    if not fits or array.dtype.kind not in "fiub":
+        wanted = " x ".join("any" if n is None else str(n) for n in shape)
+        raise TableError(
+            f"'{name}': array '{key}' is {array.dtype} of shape {array.shape}; wanted: numbers, {wanted}"
+        )
+    return array.astype(np.float64)

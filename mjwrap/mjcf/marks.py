@@ -13,6 +13,8 @@ another one. So mjwrap stores what it must know afterwards in entries that MuJoC
   read by it and by `plugin/callbacks/drawing.py`.
 - the name of a plugin's instance, ending in "mjwrap": its configuration names the muscles. Written by
   `plugin/spec/instance.py`, read by `plugin/spec/configuration.py`; a body refers to it, so that `attach` keeps it.
+- the first character of that configuration, "!" instead of a name's: the instance drives nothing. Written by
+  `plugin/uninstalling.py` into a model, read by `plugin/registering.py`.
 
 MuJoCo 3.11 to 4.0 does not use these entries: a row of gainprm, biasprm or dynprm has 10 numbers (mjNGAIN, mjNBIAS,
 mjNDYN). Of the actuators that mjwrap takes over, fixed ones use 1, affine ones 3 and muscles 9 numbers of gain and
@@ -28,8 +30,8 @@ import mujoco
 import numpy as np
 
 COLUMN = 9  # the last column of gainprm, biasprm and dynprm
-PLUGIN_NAME = "mjwrap.muscles"  # name of the engine plugin
-PLUGIN_INSTANCE = "mjwrap"  # name of its instance, after the prefix of an attached model
+PLUGIN_INSTANCE = "mjwrap"  # name of the plugin's instance, after the prefix of an attached model
+IDLE = ord("!")  # first character of the configuration of an idle instance: quoted names do not contain it
 # force range [N] of a disabled actuator in an MjSpec: the compiler rejects 0 to 0, to_xml writes nothing smaller,
 # and a muscle's force is never positive, so that it becomes zero
 DISABLED_RANGE = (0.0, 1e-12)
@@ -175,6 +177,11 @@ def hide_tendon(element: mujoco.MjsTendon) -> None:
         element.width *= HIDDEN_FACTOR
 
 
+def show_all_tendons(model: mujoco.MjModel) -> None:
+    """Give the hidden tendons of a model their widths back."""
+    model.tendon_width[model.tendon_width < HIDDEN_BELOW] /= HIDDEN_FACTOR
+
+
 def show_tendon(element: mujoco.MjsTendon) -> None:
     """Restore the width of a tendon of an MjSpec that `hide_tendon` has changed."""
     if element.width < HIDDEN_BELOW:
@@ -189,7 +196,20 @@ def is_own_instance(name: str) -> bool:
     return name.endswith(PLUGIN_INSTANCE)
 
 
+def set_idle(model: mujoco.MjModel, instance: int) -> None:
+    """Have an instance drive nothing from now on, in mjData that are made from now on."""
+    first = model.plugin_attradr[instance]
+    if model.plugin_attr[first] != 0:  # one without muscles drives none
+        model.plugin_attr[first] = IDLE
+
+
+def driving_instances(model: mujoco.MjModel) -> list[int]:
+    """Return the ids of mjwrap's instances in a model that drive muscles."""
+    firsts = {i: int(model.plugin_attr[model.plugin_attradr[i]]) for i in own_instances(model)}
+    return [i for i, first in firsts.items() if first not in (0, IDLE)]
+
+
 def own_instances(model: mujoco.MjModel) -> list[int]:
-    """Return the ids of mjwrap's instances in a model."""
+    """Return the ids of mjwrap's instances in a model, whether they drive muscles or not."""
     names = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i) or "" for i in range(model.nplugin))
     return [i for i, name in enumerate(names) if is_own_instance(name)]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import mujoco
 
-from mjwrap.mjcf.marks import own_instances
+from mjwrap.mjcf.marks import driving_instances
 
 
 def name_of(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int) -> str:
@@ -26,7 +26,7 @@ def listed(found: Iterable[str]) -> str:
 
 def has_plugin(model: mujoco.MjModel) -> bool:
     """Return whether mjwrap's engine plugin drives the muscles of a model."""
-    return bool(own_instances(model))
+    return bool(driving_instances(model))
 
 
 def qpos_names(model: mujoco.MjModel) -> list[str]:

@@ -1,8 +1,6 @@
 """The engine plugin: `mj_step`, the viewer, `rollout` and `batch` run the muscles without Python in the loop."""
 
-from mjwrap.plugin.installing import install, load
-from mjwrap.plugin.native import native
-from mjwrap.plugin.readout import Readout, excitations, read
-from mjwrap.plugin.results import Muscles
+import lazy_loader
 
-__all__ = ["Muscles", "Readout", "excitations", "install", "load", "native", "read"]
+# `import mjwrap` imports this package to register the plugin, and must stay fast
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

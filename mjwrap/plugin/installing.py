@@ -11,6 +11,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.model.takeover import Takeover
+from mjwrap.plugin.announcing import renumber
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
 from mjwrap.plugin.blocks.instance_muscles import read_muscles
 from mjwrap.plugin.blocks.transmission_part import check_moment_columns
@@ -143,6 +144,7 @@ def load(
     """
     register()
     model = read_model(path)
+    renumber(model)
     if Path(path).suffix != ".mjb":
         spec = mujoco.MjSpec.from_file(os.fspath(path))
         return install(spec, mode or WRENCH, keep_tendons=keep_tendons)

@@ -64,15 +64,16 @@ class PluginEngine:
     """Plain `mj_step` with the muscles in the engine plugin; a MuscleSystem on a second model computes the samples."""
 
     def __init__(self, source: str, mode: str, strict: bool) -> None:
-        from mjwrap.plugin import excitations, install, read
+        from mjwrap import plugin
 
-        self._read = read
-        self.model = install(load_spec(source), mode)
+        self._read = plugin.read
+        is_binary = source.lower().endswith(".mjb")  # cannot be changed, and may have the plugin already
+        self.model = plugin.load(source, mode) if is_binary else plugin.install(load_spec(source), mode)
         self.data = mujoco.MjData(self.model)
         self.muscles = MuscleSystem(load(source))
         self.sampled = mujoco.MjData(self.muscles.model)
         self._strict = strict
-        self._excitations = excitations(self.data)
+        self._excitations = plugin.excitations(self.data)
         self._copy = mujoco.MjData(self.model)
         # of muscles without an actuator, whose states the plugin keeps
         self._own = [i for i, muscle in enumerate(self.muscles.declarations) if muscle.actuator < 0]

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf import name_of, names, read_model
+from mjwrap.mjcf import has_plugin, name_of, names, read_model
 
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -21,8 +21,16 @@ _MYO = "myo_sim:"
 
 
 def load(source: str) -> mujoco.MjModel:
-    """Load an MJCF or MJB file, or "myo_sim:NAME", a model of the myo-sim package; `ModelError` if that fails."""
-    return load_spec(source).compile() if source.startswith(_MYO) else read_model(source)
+    """Load an MJCF or MJB file, or "myo_sim:NAME", a model of the myo-sim package; `ModelError` if that fails.
+
+    A model with the engine plugin is returned without it, as it was before `install`.
+    """
+    model = load_spec(source).compile() if source.startswith(_MYO) else read_model(source)
+    if has_plugin(model):
+        from mjwrap.plugin import without_plugin
+
+        return without_plugin(model)
+    return model
 
 
 def load_spec(source: str) -> mujoco.MjSpec:

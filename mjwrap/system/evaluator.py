@@ -35,7 +35,7 @@ class Evaluator(Results):
         if has_plugin(model):
             raise ModelError(
                 "the engine plugin already drives the muscles of this model (install): mj_step moves it, and "
-                "mjwrap.plugin.read(data) reads it; for a MuscleSystem compile a spec without the plugin"
+                "mjwrap.plugin.read(data) reads it; for a MuscleSystem use mjwrap.plugin.without_plugin(model)"
             )
         self.strict = strict
         self._takeover = Takeover(model)

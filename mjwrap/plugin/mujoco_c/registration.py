@@ -7,7 +7,16 @@ from typing import Any
 
 from mjwrap.plugin.mujoco_c.library import MjpPlugin, library
 
+PLUGIN_NAME = "mjwrap.muscles"  # of the engine plugin
+ATTRIBUTES = MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"  # of its configuration: texts in the model
 _PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC
+
+
+def slot_of(name: str) -> int:
+    """Return the number under which MuJoCo keeps a plugin, -1 if it is not registered."""
+    slot = ctypes.c_int(-1)
+    library().mjp_getPlugin(name.encode(), ctypes.byref(slot))
+    return slot.value
 
 
 def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str, ...] = ()) -> None:
@@ -15,8 +24,8 @@ def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str,
 
     callbacks: numba or ctypes functions by their field in mjpPlugin; attributes: names of its configuration values.
     """
-    lib, slot = library(), ctypes.c_int(-1)
-    if lib.mjp_getPlugin(name.encode(), ctypes.byref(slot)):
+    lib = library()
+    if slot_of(name) >= 0:
         return
     texts = (ctypes.c_char_p * max(1, len(attributes)))(*(text.encode() for text in attributes))
     plugin = MjpPlugin(name=name.encode(), nattribute=len(attributes), attributes=texts)
@@ -26,6 +35,16 @@ def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str,
         keep_forever(function)
     keep_forever(plugin)
     lib.mjp_registerPlugin(ctypes.byref(plugin))
+
+
+def add_callbacks(name: str, callbacks: dict[str, Any]) -> None:
+    """Give a registered plugin its other callbacks, unless it has them: MuJoCo reads its record at every call."""
+    plugin = library().mjp_getPlugin(name.encode(), None).contents
+    if any(getattr(plugin, field) for field in callbacks):
+        return
+    for field, function in callbacks.items():
+        keep_forever(function)
+        setattr(plugin, field, address_of(function))
 
 
 def keep_forever(thing: Any) -> None:

@@ -183,7 +183,9 @@ def _find() -> Drawing:
         geom, size = _fields("mjvGeom")
         scene, option, model = _fields("mjvScene")[0], _fields("mjvOption")[0], _fields("mjModel")[0]
         visual = _visual()
-        probe = mujoco.MjModel.from_xml_string(_XML)
+        probe = mujoco.MjSpec.from_string(
+            _XML
+        ).compile()  # MjModel.from_xml_string never ends inside MjData()
         _verify_model(probe, visual)
         _verify_scene(probe, _verify_option())
         label = {f.name: f for f in structs()["mjvGeom"].fields}["label"]

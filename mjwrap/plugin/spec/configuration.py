@@ -12,11 +12,10 @@ from urllib.parse import quote, unquote
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.marks import PLUGIN_INSTANCE, PLUGIN_NAME, is_own_instance
+from mjwrap.mjcf.marks import IDLE, PLUGIN_INSTANCE, is_own_instance
 from mjwrap.plugin.mujoco_c.library import library
+from mjwrap.plugin.mujoco_c.registration import ATTRIBUTES, MODE, MUSCLES, NUMBERS, PLUGIN_NAME
 
-MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"
-ATTRIBUTES = (MUSCLES, NUMBERS, MODE)
 WRENCH, TRANSMISSION = "wrench", "transmission"
 MODES = (WRENCH, TRANSMISSION)
 
@@ -57,6 +56,12 @@ def configuration_at(model: int, instance: int) -> Configuration:
     name = lib.mj_id2name(model, int(mujoco.mjtObj.mjOBJ_PLUGIN), instance) or b""
     texts = {key: lib.mj_getPluginConfig(model, instance, key.encode()) or b"" for key in ATTRIBUTES}
     return parse_configuration(name.decode(), {key: text.decode() for key, text in texts.items()})
+
+
+def is_idle(model: int, instance: int) -> bool:
+    """Return whether an instance of the model at an address drives nothing (`plugin/uninstalling.py`)."""
+    text = library().mj_getPluginConfig(model, instance, MUSCLES.encode()) or b""
+    return bool(text.startswith(bytes([IDLE])))
 
 
 def spec_instances(spec: mujoco.MjSpec) -> list[mujoco.MjsPlugin]:

@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf.marks import PLUGIN_INSTANCE, PLUGIN_NAME
+from mjwrap.mjcf.marks import PLUGIN_INSTANCE
+from mjwrap.plugin.mujoco_c.registration import PLUGIN_NAME
 from mjwrap.plugin.spec.configuration import spec_instances
 
 
