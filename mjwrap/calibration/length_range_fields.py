@@ -27,7 +27,7 @@ def set_length_ranges(spec: mujoco.MjSpec, **options: Any) -> dict[str, LengthRa
         options: arguments of `length_ranges`, such as `ranges`, `base` or `seed`.
 
     Returns:
-        The range [m] of each actuator that had none, by name.
+        The range of the path of each actuator that had none, by name; `lengthrange` is this times the actuator's gear.
 
     Raises:
         ModelError: mjwrap cannot take over a muscle without a range, it has no path at any pose, or its length does
@@ -59,7 +59,10 @@ def set_length_ranges(spec: mujoco.MjSpec, **options: Any) -> dict[str, LengthRa
                     f"muscle {name!r}: its length does not change ({each.shortest:g} m to {each.longest:g} m)"
                 )
         for element in missing:
-            element.lengthrange = found[element.name].shortest, found[element.name].longest
+            ends = found[element.name].shortest, found[element.name].longest
+            element.lengthrange = sorted(
+                element.gear[0] * end for end in ends
+            )  # of the actuator, not of the tendon
     except BaseException:
         for element, values in zip(missing, before, strict=True):
             element.lengthrange = values
