@@ -19,7 +19,7 @@ from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.traits import branched, hollow
+from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided
 from mjwrap.kernels.geometry.winding import unwrap_angle
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED
 from mjwrap.kernels.wraps.end_on_surface import (
@@ -32,6 +32,7 @@ from mjwrap.kernels.wraps.end_on_surface import (
 )
 from mjwrap.kernels.wraps.initial_guess import (
     guess_in_half_plane,
+    height_of_section,
     perpendicular,
     place_contact,
     place_contact_on_tube,
@@ -42,6 +43,7 @@ SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
+NEAR_HINT = 5  # half planes within 60 degrees of the hint
 DIRECTIONS = 12  # number of half planes around AB
 CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
 SAME_BRANCH = 1.0  # winding angles that differ by less belong to the same branch [rad]
@@ -116,6 +118,16 @@ def wrap_by_search(k, ends, node, search):
             if good:
                 node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
                 return inside
+        elif (
+            hinted
+            and not one_sided(k, node)
+            and _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
+            and _search(
+                k, ends, node, ax, ay, az, dx, dy, dz, size, share, True, True, branch, before, False,
+                high_a, high_b, NEAR_HINT,
+            )
+        ):  # fmt: skip
+            return inside
         _leave_free(k, node, straight, low, ax, ay, az, bx, by, bz)
         return inside
     # leave the lost contact where it was: Newton's method over the whole row may find it again
@@ -127,16 +139,46 @@ def wrap_by_search(k, ends, node, search):
     clear = low >= -CLEAR_DEPTH * node[k, SIZE]
     _search(
         k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before, clear,
-        high_a, high_b,
+        high_a, high_b, DIRECTIONS,
     )  # fmt: skip
     return inside
 
 
 @jit
+def _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
+    """Return whether the hint lies behind row k's surface, seen from the nearest point of the segment A + share d."""
+    x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
+    _, _, _, nx, ny, nz = project(node, k, x, y, z)
+    along = nx * (x - ax - share * dx) + ny * (y - ay - share * dy) + nz * (z - az - share * dz)
+    return along > 0.0
+
+
+@jit
 def _search(
-    k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, branch, before, clear, high_a, high_b
+    k,
+    ends,
+    node,
+    ax,
+    ay,
+    az,
+    dx,
+    dy,
+    dz,
+    size,
+    share,
+    hinted,
+    cold,
+    branch,
+    before,
+    clear,
+    high_a,
+    high_b,
+    most,
 ):
-    """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found."""
+    """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found.
+
+    most: number of half planes to try. Returns whether a path was found.
+    """
     # u along AB; w perpendicular to it, from AB's lowest point towards the hint or along the normal; v = u x w
     ux, uy, uz = dx / size, dy / size, dz / size
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
@@ -153,34 +195,31 @@ def _search(
         wx, wy, wz = wx / length, wy / length, wz / length
     vx, vy, vz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
     winds = branched(k, node) and node[k, lay.TOUCH] == 0.0
+    # beyond the hint: how far from AB, which is clear of the surface, a section is looked for
+    above = 0.0
+    if most < DIRECTIONS:
+        above = length + node[k, SIZE]
     found, best, fresh = False, 0.0, -1
     guessed = False
     j = 0
     # the best solution so far, then the first guess
     memory = carray(stack(), (80,))
-    for j in range(DIRECTIONS):
+    for j in range(most):
         # to both sides in turn: 0, 1, -1, 2, -2, ... twelfths of a turn
         turn = (j + 1) // 2 * (2.0 * math.pi / DIRECTIONS)
         c, s = math.cos(turn), math.sin(turn) if j % 2 == 1 else -math.sin(turn)
         # hooked: AB is clear, so that no section lies in its way; guesses all round the tube instead
         if clear:
             place_contact_on_tube(k, node, fx, fy, fz, dx, dy, dz, j * (2.0 * math.pi / DIRECTIONS))
-        elif not guess_in_half_plane(
-            k,
-            node,
-            ax,
-            ay,
-            az,
-            ux,
-            uy,
-            uz,
-            c * wx + s * vx,
-            c * wy + s * vy,
-            c * wz + s * vz,
-            size,
-            share * size,
-        ):
-            continue
+        else:
+            gx, gy, gz = c * wx + s * vx, c * wy + s * vy, c * wz + s * vz
+            lift = 0.0
+            if above > 0.0 and not ellipse_sections(k, node):
+                lift = height_of_section(k, node, fx, fy, fz, gx, gy, gz, above)
+            if lift < 0.0 or not guess_in_half_plane(
+                k, node, ax, ay, az, ux, uy, uz, gx, gy, gz, size, share * size, lift
+            ):
+                continue
         if not guessed:
             guessed = True
             for i in range(lay.STATE):
@@ -218,7 +257,7 @@ def _search(
     node[k, S_MODE] = TOUCHED
     # if the best one was the last that was tried, the row still holds its evaluation
     if found and fresh == j:
-        return
+        return found
     node[k, lay.W_WRAP_ERROR] = -1.0
     if found or guessed:
         start = 0 if found else lay.STATE
@@ -227,3 +266,4 @@ def _search(
     else:
         place_contact(k, node, fx, fy, fz, ux, uy, uz, 0.0)
     geodesic(k, node, ends[0], ends[1], ends[2])
+    return found
