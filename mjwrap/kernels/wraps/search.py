@@ -146,11 +146,17 @@ def wrap_by_search(k, ends, node, search):
 
 @jit
 def _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
-    """Return whether the hint lies behind row k's surface, seen from the nearest point of the segment A + share d."""
+    """Return whether the hint lies behind row k's surface, seen from the lowest point F of the segment A + share d.
+
+    It is beyond the tangent plane of the surface at the point nearest to F, and the surface between F and the hint.
+    """
     x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
+    fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
+    px, py, pz, nx, ny, nz = project(node, k, fx, fy, fz)
+    if nx * (x - px) + ny * (y - py) + nz * (z - pz) >= 0.0:
+        return False
     _, _, _, nx, ny, nz = project(node, k, x, y, z)
-    along = nx * (x - ax - share * dx) + ny * (y - ay - share * dy) + nz * (z - az - share * dz)
-    return along > 0.0
+    return nx * (x - fx) + ny * (y - fy) + nz * (z - fz) > 0.0
 
 
 @jit
