@@ -11,6 +11,7 @@ from .calibration import fit_fiber_and_slack as fit_fiber_and_slack
 from .calibration import hill_from_mujoco as hill_from_mujoco
 from .calibration import implausible as implausible
 from .calibration import length_ranges as length_ranges
+from .calibration import set_length_ranges as set_length_ranges
 from .errors import GeometryError as GeometryError
 from .errors import MjwrapError as MjwrapError
 from .errors import ModelError as ModelError

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjwrap.model.couplings import CoupledJoints, read_couplings
+from mjwrap.mjcf.couplings import CoupledJoints, read_couplings
 from mjwrap.poses.joint_sweeps import PoseMaker
 
 # A free body, a ball and hinges; a chain of three followers whose equalities stand in the wrong order; one without a

@@ -28,7 +28,7 @@ import mjwrap as mw
 from mjwrap.comparison import Jump, compare_poses
 from mjwrap.comparison.motion import unstable
 from mjwrap.mjcf import name_of, read_declarations
-from mjwrap.model.couplings import read_couplings
+from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.paths import Status
 from mjwrap.plugin import read
 from mjwrap.runs.models import load_spec

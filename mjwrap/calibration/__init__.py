@@ -8,6 +8,7 @@ from mjwrap.calibration.fibers import (
     fit_fiber_and_slack,
     hill_from_mujoco,
 )
+from mjwrap.calibration.length_range_fields import set_length_ranges
 from mjwrap.calibration.plausibility import implausible
 from mjwrap.calibration.ranges import LengthRange, length_ranges
 from mjwrap.calibration.report import Finding, Implausible, ParameterLimits, ParameterReport
@@ -26,4 +27,5 @@ __all__ = [
     "hill_from_mujoco",
     "implausible",
     "length_ranges",
+    "set_length_ranges",
 ]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf import MuscleDeclaration, name_of, names
-from mjwrap.model.couplings import CoupledJoints
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.model.kinematic_tree import crossed_dofs
 
 Array = NDArray[np.float64]

@@ -144,8 +144,10 @@ def length_ranges(
         The length range of each muscle, by name.
 
     Raises:
-        ModelError: a name is unknown, or a range is not possible.
+        ModelError: a name is unknown, a range is not possible, or `muscles` is not a MuscleSystem.
     """
+    if not isinstance(muscles, MuscleSystem):
+        raise ModelError(f"expected a MuscleSystem (mw.MuscleSystem(model)), not {type(muscles).__name__}")
     for name in names or ():
         if name not in muscles.names:
             raise ModelError(

@@ -12,6 +12,10 @@ Array = NDArray[np.float64]
 WIDTHS = tuple(
     2.0**-k for k in range(8, 14)
 )  # widths of central differences [rad; relative to the muscles' lengths for slides]
+ENOUGH = (
+    2.0**-6
+)  # shortest piece of a path, as a share of the muscles' lengths, for which WIDTHS are narrow enough
+MOST_FURTHER = 8  # narrower widths; rounding dominates beyond them
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
@@ -27,6 +31,7 @@ class Neighbourhood:
         self._bad = muscles.status != 0
         self._turns = muscles.model.jnt_type[muscles.model.dof_jntid] == _HINGE
         self._size = min(1.0, float(np.median(muscles.length)))
+        self._widths = _widths(muscles)
 
     def _contacts(self) -> NDArray[np.int64]:
         return np.diff(self._muscles.contacts()[1])
@@ -44,11 +49,29 @@ class Neighbourhood:
     def central(self, direction: Array) -> Array:
         """Return central differences (widths, n) of the lengths along a direction (nv,)."""
         slides = (direction != 0.0)[~self._turns].any()
-        widths = [h * (self._size if slides else 1.0) for h in WIDTHS]
+        widths = [h * (self._size if slides else 1.0) for h in self._widths]
         found = [(self._length(direction, h) - self._length(direction, -h)) / (2.0 * h) for h in widths]
         self._data.qpos[:] = self._qpos
         self._muscles.set_branch(self._data, self._branch)
         return np.array(found)
+
+
+def _widths(muscles: MuscleSystem) -> tuple[float, ...]:
+    """Return `WIDTHS`, continued by narrower ones if a path has pieces that are short beside these.
+
+    The length changes its course within the shortest piece of a path: between two via points, or on a small surface.
+    """
+    points, starts = muscles.polylines()
+    pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    pieces[starts[1:-1] - 1] = np.inf  # from the end of one muscle to the start of the next
+    shortest = float(
+        pieces[pieces > 0.0].min(initial=np.inf)
+    )  # NaN between the parts of a muscle is left out, too
+    if not 0.0 < shortest < np.inf:
+        return WIDTHS
+    share = shortest / float(np.median(muscles.length))
+    further = int(np.clip(np.ceil(np.log2(ENOUGH / share)), 0, MOST_FURTHER))
+    return (*WIDTHS, *(WIDTHS[-1] * 2.0 ** -(k + 1) for k in range(further)))
 
 
 def extrapolated_error(central: Array, claimed: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.outcome import Check
 from mjwrap.errors import ModelError, StateError
-from mjwrap.model.couplings import read_couplings
+from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 

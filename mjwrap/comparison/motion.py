@@ -15,6 +15,7 @@ from mjwrap.mjcf import dof_names, name_of
 from mjwrap.model.takeover import Takeover
 from mjwrap.runs.excitation import Excitation
 from mjwrap.system import MuscleSystem
+from mjwrap.text import counted
 
 Array = NDArray[np.float64]
 _UNSTABLE = (
@@ -36,7 +37,7 @@ class MotionDifference:
         dofs: names of the degrees of freedom.
         places: (nv,) index in qpos of each degree of freedom; for ball and free joints that of the joint's first.
         stopped: why a run ended early, or empty.
-        paths: mjwrap's report of muscles without a path.
+        paths: muscles without a path at some steps of mjwrap's run, the reason, and what acted instead; a line each.
     """
 
     time: Array
@@ -136,6 +137,7 @@ def compare_motion(
             mujoco.mj_resetDataKeyframe(each, data, key)
         if qpos is not None:
             data.qpos[:] = qpos
+    kept = np.zeros(muscles.n, dtype=np.int64)
     times, theirs, ours, stopped = [0.0], [native.qpos.copy()], [driven.qpos.copy()], ""
     for _ in range(round(duration / float(model.opt.timestep))):
         excitation.write(native, own=False)
@@ -145,6 +147,7 @@ def compare_motion(
             if unstable(native):
                 stopped = f"MuJoCo's own run became unstable at {times[-1]:g} s"
             muscles.step(driven)
+            kept += muscles.held
         except MjwrapError as error:
             stopped = f"{stopped}; " * bool(stopped) + f"mjwrap's run stopped: {error}"
         if stopped:
@@ -158,7 +161,22 @@ def compare_motion(
     for row, a, b in zip(gap, theirs, ours, strict=True):
         mujoco.mj_differentiatePos(model, row, 1.0, a, b)
     runs = np.array(times), np.array(theirs), np.array(ours)
-    return MotionDifference(*runs, gap, dof_names(model), _places(model), stopped, muscles.report())
+    return MotionDifference(*runs, gap, dof_names(model), _places(model), stopped, _paths(muscles, kept))
+
+
+def _paths(muscles: MuscleSystem, kept: NDArray[np.int64]) -> str:
+    """Return a line for each muscle without a path at some steps; kept (n,): steps at which it kept its last force."""
+    lines = muscles.report().splitlines()
+    failed = [i for i, count in enumerate(muscles.failures) if count]
+    forces = {
+        i: "its last valid force was kept"
+        if kept[i] == muscles.failures[i]
+        else "its length was continued from the surface"
+        if not kept[i]
+        else f"its last valid force was kept at {counted(int(kept[i]), 'step')}, else its length was continued"
+        for i in failed
+    }
+    return "\n".join(f"{line}; {forces[i]}" for i, line in zip(failed, lines, strict=True))
 
 
 def _places(model: mujoco.MjModel) -> list[int]:

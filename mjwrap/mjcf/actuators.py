@@ -11,7 +11,7 @@ import numpy as np
 
 from mjwrap.errors import ModelError
 from mjwrap.kernels.musculotendon import actearly
-from mjwrap.mjcf.inside import end_is_inside, side_is_inside
+from mjwrap.mjcf.inside import end_is_inside, is_inside_at_keyframes, side_is_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import geoms_of, tendon_stops
 from mjwrap.muscles.laws import MuJoCoMuscle
@@ -135,7 +135,7 @@ def _inside_reason(model: mujoco.MjModel, rest: mujoco.MjData, tendon: int) -> s
                 f"the reference pose, moves relative to it"
             )
         for end in ends:
-            if end_is_inside(model, rest, index, end):
+            if end_is_inside(model, rest, index, end) and is_inside_at_keyframes(model, index, end):
                 site = name_of(model, OBJ.mjOBJ_SITE, end)
                 return f"no path can go round {geom}: site '{site}' is inside it at the reference pose"
     return None

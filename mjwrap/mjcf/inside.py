@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.mjcf.couplings import CoupledJoints
+
 Array = NDArray[np.float64]
 POSES = 64
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)  # the type of hinges is larger
@@ -21,6 +23,24 @@ def is_beside(model: mujoco.MjModel, geom: int, site: int) -> bool:
         return True
     welded = int(model.body_weldid[first]) == int(model.body_weldid[second])
     return welded and (model.nmocap == 0 or int(model.body_rootid[first]) == int(model.body_rootid[second]))
+
+
+def reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
+    """Return the kinematics at qpos0, with joints that follow others where these put them."""
+    return _kinematics(model, model.qpos0)
+
+
+def is_inside_at_keyframes(model: mujoco.MjModel, geom: int, site: int) -> bool:
+    """Return whether a site lies inside a geom at every keyframe, as `end_is_inside`; true without keyframes."""
+    return all(end_is_inside(model, _kinematics(model, pose), geom, site) for pose in model.key_qpos)
+
+
+def _kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    CoupledJoints(model).place(data.qpos)
+    mujoco.mj_kinematics(model, data)
+    return data
 
 
 def end_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int) -> bool:
@@ -42,16 +62,16 @@ def side_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site:
 def shares_inside(model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
     """Return, for pairs of geom and end point (site), the share of poses at which the end is inside (n,).
 
-    Poses: joints at random in their ranges; joints without limits, ball and free joints stay at the reference. Each
-    joint has a random generator of its own, seeded by its properties, so that the result is the same if the model is
-    part of a larger one.
+    Poses: joints at random in their ranges; joints without limits, ball and free joints stay at the reference, and
+    joints that follow others by an equality are where these put them. Each joint has a random generator of its own,
+    seeded by its properties, so that the result is the same if the model is part of a larger one.
     """
     inside = np.zeros(len(pairs))
     if not pairs:
         return inside
     geoms, sites = np.array(pairs).T
     radius, level = model.geom_size[geoms, 0], model.geom_type[geoms] == _CYLINDER
-    data = mujoco.MjData(model)
+    data, coupled = mujoco.MjData(model), CoupledJoints(model)
     joints = np.flatnonzero(np.asarray(model.jnt_limited, dtype=bool) & (model.jnt_type >= _SLIDE))
     low, high = model.jnt_range[joints].T
     what = [model.jnt_range, model.jnt_pos, model.jnt_axis, model.body_pos[model.jnt_bodyid]]
@@ -59,6 +79,7 @@ def shares_inside(model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
     draws = np.array([np.random.default_rng(seed).random(POSES) for seed in seeds]).reshape(-1, POSES)
     for pose in draws.T:
         data.qpos[model.jnt_qposadr[joints]] = low + (high - low) * pose
+        coupled.place(data.qpos)
         mujoco.mj_kinematics(model, data)
         offset = data.site_xpos[sites] - data.geom_xpos[geoms]
         along = np.einsum("ni,ni->n", offset, data.geom_xmat[geoms][:, 2::3])

@@ -33,11 +33,21 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
         try:
             model = load(os.fspath(file))
         except (ValueError, mujoco.FatalError) as error:
-            reason = " ".join("; ".join([*found, str(error)]).split())
+            reason = with_remedy(" ".join("; ".join([*found, str(error)]).split()))
             raise ModelError(f"{file} is not a model that MuJoCo can load: {reason}") from None
     for text in found:
         warnings.warn(f"{file}: {text}", stacklevel=2)
     return model
+
+
+def with_remedy(reason: str) -> str:
+    """Return MuJoCo's reason against a model, and what helps if it could not find a muscle's length range."""
+    if "engthrange" not in reason and "ength range" not in reason:
+        return reason
+    return (
+        f"{reason}. MuJoCo searches for a muscle's length range along its own tendon, which may jump; "
+        "mw.set_length_ranges(spec) writes the ranges along mjwrap's paths into an MjSpec"
+    )
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import mujoco
 from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, path_reason, pulled_tendon
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
-from mjwrap.mjcf.inside import shares_inside
+from mjwrap.mjcf.inside import reference_pose, shares_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.tuples import read_tuple
@@ -25,8 +25,7 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
     """
     if not hasattr(model, "nactuator"):
         raise VersionError(f"mjwrap needs MuJoCo 3.11 or newer, this is {mujoco.__version__}")
-    rest = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, rest)
+    rest = reference_pose(model)
     by_actuator, free = _read_tuples(model, rest, transmission)
     muscles: list[MuscleDeclaration] = []
     native: dict[str, str] = {}

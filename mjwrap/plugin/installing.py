@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model
+from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model, with_remedy
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
@@ -79,7 +79,9 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjM
         declared = _declared(model, mode, taken)
         muscles = [muscle for muscle in declared if muscle.name not in taken]
         if not muscles and not taken:
-            raise ModelError(f"the model declares no muscle for mjwrap{_hint(spec, mode)}")
+            raise ModelError(
+                f"the model declares no muscle for mjwrap{_reasons(model, mode) or _hint(spec, mode)}"
+            )
         disable_actuators(spec, model, muscles)
     names = [muscle.name for muscle in muscles]
     plan, muscles = read_muscles(model, names, mode)
@@ -116,6 +118,12 @@ def _declared(model: mujoco.MjModel, mode: str, taken: dict[str, str]) -> list[M
         for muscle in read_declarations(model, transmission=kind == TRANSMISSION).muscles
         if taken.get(muscle.name, mode) == kind
     ]
+
+
+def _reasons(model: mujoco.MjModel, mode: str) -> str:
+    """Return, for the error of a model without a muscle for mjwrap, why its native muscles are left to MuJoCo."""
+    native = read_declarations(model, transmission=mode == TRANSMISSION).native
+    return "".join(f"\n  {name}: {reason}" for name, reason in native.items())
 
 
 def _hint(spec: mujoco.MjSpec, mode: str) -> str:
@@ -168,4 +176,9 @@ def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         reason = take_error()
-        raise ModelError(str(reason) if reason else f"the model does not compile: {error}") from reason
+        told = (
+            str(reason)
+            if reason
+            else with_remedy(f"the model does not compile: {' '.join(str(error).split())}")
+        )
+        raise ModelError(told) from reason

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.mjcf import name_of
-from mjwrap.model.couplings import CoupledJoints
+from mjwrap.mjcf.couplings import CoupledJoints
 
 Array = NDArray[np.float64]
 _KINDS = mujoco.mjtJoint

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjwrap.errors import RecordingError
-from mjwrap.model.couplings import read_couplings
+from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.model.kinematic_tree import crossed_dofs
 
 MOST, LEAST = 12, 4  # numbers of groups, and of muscles in each but the last, if no groups are given

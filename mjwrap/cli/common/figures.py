@@ -15,6 +15,13 @@ def need_matplotlib() -> None:
     except ImportError:
         raise UserError("--plot needs matplotlib: pip install 'mjwrap[demo]'") from None
     matplotlib.use("Agg")
+    # names of models are text, whatever they contain: no formulas between dollars, no TeX
+    matplotlib.rcParams.update({"text.parse_math": False, "text.usetex": False})
+
+
+def legend_label(name: str) -> str:
+    """Return a model's name as matplotlib shows it in a legend, which leaves out labels that begin with "_"."""
+    return f" {name}" if name.startswith("_") else name
 
 
 def save_figure(figure: Any, output: PartFile) -> None:

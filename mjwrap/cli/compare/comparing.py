@@ -12,9 +12,10 @@ from typing import Any
 import mujoco
 
 from mjwrap import MuscleSystem, Table, read_table
-from mjwrap.cli.common.errors import FAULTS, UserError
+from mjwrap.cli.common.errors import FAULTS, RUN_FAILED, UserError
 from mjwrap.cli.common.figures import need_matplotlib
 from mjwrap.cli.common.output import Report, open_output
+from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import Stages
 from mjwrap.cli.compare.rows import PoseRows, write_tables
 from mjwrap.cli.compare.text import as_values, tell_motion, tell_poses, tell_tables
@@ -103,7 +104,9 @@ def compare(settings: CompareSettings) -> int:
         f"{settings.model}: {counted(len(found.muscles), 'muscle')} at {counted(found.poses, 'pose')} each"
     )
     tell_poses(report.say, found, verdicts)
-    told = {"csv": f" ({rows.close()})"} if rows is not None else {}
+    outputs, told = Outputs("compare"), {}
+    if rows is not None:
+        outputs.attempt("csv", lambda: told.update(csv=f" ({rows.close()})"))
 
     tell_tables(report.say, tables)
     motion = None
@@ -117,20 +120,24 @@ def compare(settings: CompareSettings) -> int:
         from mjwrap.cli.compare.plot import plot_comparison
 
         title = f"{Path(settings.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
-        plot_comparison(plot, title, found, motion)
+        outputs.attempt("plot", lambda: plot_comparison(plot, title, found, motion))
     if page is not None:
         from mjwrap.cli.compare.page import write_page
 
-        write_page(page, settings.model, settings.command, found, verdicts, motion, tables)
+        outputs.attempt(
+            "report",
+            lambda: write_page(page, settings.model, settings.command, found, verdicts, motion, tables),
+        )
     files = {"plot": settings.plot, "report": settings.page, "csv": settings.csv}
     if settings.csv and given is not None:
         files["tables"] = tables_path(settings.csv)
-    for what, path in files.items():
-        if path:
-            report.say(f"{what + ':':10s} {path}{told.get(what, '')}")
+    for what, path in outputs.completed({what: path for what, path in files.items() if path}).items():
+        report.say(f"{what + ':':10s} {path}{told.get(what, '')}")
     asked = {name: getattr(settings, name) for name in ("model", "samples", "bases", "seed")}
     report.finish({**asked, **as_values(found, verdicts, motion), "tables": [vars(d) for d in tables]})
     wrong = found.at_fault or any(jump.program == "mjwrap" for jump in found.jumps)
+    if outputs.failed:
+        return RUN_FAILED
     return FAULTS if settings.check and wrong else 0
 
 

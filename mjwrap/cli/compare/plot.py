@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from mjwrap.cli.common.figures import save_figure
+from mjwrap.cli.common.figures import legend_label, save_figure
 from mjwrap.cli.compare.text import TITLES
 from mjwrap.comparison import AGREE, MotionDifference, MuscleSummary, Outcome, PoseComparison
 from mjwrap.files.atomic import PartFile
@@ -116,7 +116,7 @@ def draw_motion(pair: Any, motion: MotionDifference) -> None:
     """Draw the joint that differs most in both simulations, and the differences of the six that differ most."""
     order = np.argsort(-np.abs(motion.difference).max(axis=0))[:6]
     for d in order:
-        pair[1].plot(motion.time, motion.difference[:, d], linewidth=1.2, label=motion.dofs[d])
+        pair[1].plot(motion.time, motion.difference[:, d], linewidth=1.2, label=legend_label(motion.dofs[d]))
     pair[1].set_ylabel("mjwrap − MuJoCo [rad, m]", fontsize=8.5)
     pair[1].legend(fontsize=7, ncols=2, framealpha=0.7)
     place = motion.places[int(order[0])]

@@ -142,7 +142,7 @@ def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries:
     if motion.stopped:
         say(f"  ended early: {motion.stopped}")
     if motion.paths:
-        say("  muscles without a path in mjwrap's simulation (they kept their last valid force):")
+        say("  muscles without a path at some steps of mjwrap's simulation:")
         say("\n".join(f"    {line}" for line in motion.paths.splitlines()))
 
 

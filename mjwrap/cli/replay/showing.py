@@ -49,12 +49,10 @@ def replay_states(settings: ReplaySettings, states: StatesSettings) -> int:
     )
 
     if states.kept or settings.info or settings.json:
-        recompute(settings.file, states, json=settings.json)
-        return 0
+        return recompute(settings.file, states, json=settings.json)
     with tempfile.TemporaryDirectory(prefix="mjwrap-") as folder:
         path = os.path.join(folder, f"{Path(settings.file).stem}.rrd")
-        recompute(settings.file, states, recording=path)
-        return show(settings, path)
+        return recompute(settings.file, states, recording=path) or show(settings, path)
 
 
 def describe(summary: Summary) -> str:

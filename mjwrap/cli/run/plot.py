@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize, PowerNorm
 from numpy.typing import NDArray
 
 from mjwrap import MuscleSystem
-from mjwrap.cli.common.figures import save_figure
+from mjwrap.cli.common.figures import legend_label, save_figure
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import name_of
 from mjwrap.runs.plot_history import PlotHistory
@@ -77,7 +77,12 @@ def _lines(axis: Any, time: Array, curves: dict[str, Array], label: str, wide: b
     colours = plt.get_cmap("tab10").colors  # pyright: ignore[reportAttributeAccessIssue]
     for k, (name, curve) in enumerate(curves.items()):
         axis.plot(
-            time, curve, color=colours[k % 10], linestyle=_STYLES[k // 10 % 3], linewidth=1.4, label=name
+            time,
+            curve,
+            color=colours[k % 10],
+            linestyle=_STYLES[k // 10 % 3],
+            linewidth=1.4,
+            label=legend_label(name),
         )
     axis.set_ylabel(label)
     axis.grid(alpha=0.25)

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mjwrap.cli.common.figures import need_matplotlib
 from mjwrap.cli.common.output import open_analysis, open_output, opened
+from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.recorded import RecordingSettings, open_recorder
 from mjwrap.files import SUFFIXES
 from mjwrap.runs.engine import Engine, PluginEngine
 from mjwrap.runs.muscle_analysis_tables import MuscleAnalysisTables
 from mjwrap.runs.plot_history import PlotHistory
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTableFile
-from mjwrap.runs.simulation import Log
+
+if TYPE_CHECKING:
+    from mjwrap import Video
 
 
 @dataclass(frozen=True)
@@ -61,49 +65,48 @@ class OutputSettings:
 
 def open_outputs(
     settings: OutputSettings, source: str, engine: Engine, stack: contextlib.ExitStack
-) -> tuple[list[Log], list[Callable[[], None]]]:
-    """Open the output files; return the functions to call at each sample, and those to call at the end.
+) -> Outputs:
+    """Open the output files.
 
-    `stack` closes what has to be closed however the run ends. source: the model's file or name, for the title of the
-    plot. Raises `UserError` if a file cannot be written.
+    `stack` closes what has to be closed if the run ends with an error. source: the model's file or name, for the title
+    of the plot. Raises `UserError` if a file cannot be written.
     """
     model, muscles = engine.muscles.model, engine.muscles
-    logs: list[Log] = []
-    closes: list[Callable[[], None]] = []
+    outputs = Outputs("run")
     plot = open_output(settings.plot, "--plot", ".png", ".pdf", ".svg") if settings.plot else None
-    tables = [open_output(settings.csv, "--csv", ".csv")] if settings.csv else []
-    tables += [open_output(settings.table, "--out", *SUFFIXES)] if settings.table else []
+    tables = {"csv": open_output(settings.csv, "--csv", ".csv")} if settings.csv else {}
+    if settings.table:
+        tables["table"] = open_output(settings.table, "--out", *SUFFIXES)
     if plot is not None:
         need_matplotlib()
-    for output in tables:
+    for name, output in tables.items():
         table = RunTableFile(output, model, muscles, settings.kinds)
-        logs.append(table.log)
-        closes.append(table.close)
+        outputs.add(name, table.log, table.close)
     if settings.analysis:
         analysis = MuscleAnalysisTables(settings.analysis, model, muscles, open_analysis)
-        logs.append(analysis.log)
-        closes.append(analysis.close)
+        outputs.add("analysis", analysis.log, analysis.close)
     if settings.recording.wanted:
-        logs.append(open_recorder(settings.recording, model, muscles, stack).log)
+        recorder = open_recorder(settings.recording, model, muscles, stack)
+        outputs.add("recording", recorder.log, recorder.close)
     if isinstance(engine, PluginEngine) and settings.film:
-        logs.append(_open_film(settings.film, engine, stack))
+        film = _open_film(settings.film, engine, stack)
+        outputs.add("video", lambda _: film.log(engine.fresh()), film.close)
     if plot is not None:
         history = PlotHistory(muscles)
-        logs.append(history.log)
 
         def draw() -> None:
             from mjwrap.cli.run.plot import plot_run
 
             plot_run(plot, f"{Path(source).name}, {engine.data.time:.4g} s", model, muscles, history)
 
-        closes.append(draw)
-    return logs, closes
+        outputs.add("plot", history.log, draw)
+    return outputs
 
 
-def _open_film(film: FilmSettings, engine: PluginEngine, stack: contextlib.ExitStack) -> Log:
+def _open_film(film: FilmSettings, engine: PluginEngine, stack: contextlib.ExitStack) -> Video:
     from mjwrap import Video  # with MuJoCo's renderer
 
-    video = stack.enter_context(
+    return stack.enter_context(
         opened(
             lambda: Video(
                 engine.model, film.path, fps=film.fps, speed=film.speed, width=film.width, height=film.height,
@@ -111,4 +114,3 @@ def _open_film(film: FilmSettings, engine: PluginEngine, stack: contextlib.ExitS
             )
         )
     )  # fmt: skip
-    return lambda _: video.log(engine.fresh())

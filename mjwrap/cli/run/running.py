@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 import mujoco
 
 from mjwrap import __version__
+from mjwrap.cli.common.errors import RUN_FAILED
 from mjwrap.cli.common.output import Report, opened
+from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
@@ -18,7 +20,7 @@ from mjwrap.cli.run.run_files import OutputSettings, open_outputs
 from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
 from mjwrap.runs.engine import MODES
-from mjwrap.runs.simulation import Log, RunSettings, Simulation, WallTime
+from mjwrap.runs.simulation import RunSettings, Simulation, WallTime
 from mjwrap.text import counted
 
 
@@ -43,23 +45,23 @@ def run(settings: RunCommandSettings) -> int:
     report = Report(settings.json)
     with contextlib.ExitStack() as stack:
         server = start_server(settings.serve_port, stack)
-        with contextlib.ExitStack() as outputs:
+        with contextlib.ExitStack() as held:
             with uninterrupted():
                 wanted = settings.outputs
                 if server:
                     wanted = replace(wanted, recording=replace(wanted.recording, connect=server.connect))
-                logs, closes = open_outputs(wanted, settings.model, simulation.engine, outputs)
+                outputs = open_outputs(wanted, settings.model, simulation.engine, held)
             simulation.begin()
             with Interrupt() as interrupt:
-                spent = advance(simulation, logs, interrupt)
+                spent = advance(simulation, outputs, interrupt)
                 closing = time.perf_counter()
-                for close in closes:
-                    close()
                 outputs.close()
-        if logs:
-            spent = spent._replace(outputs=spent.outputs + time.perf_counter() - closing)
-        tell(report, settings, simulation, spent)
-        report.finish(facts(settings, simulation, spent, interrupt.asked))
+                spent = spent._replace(outputs=spent.outputs + time.perf_counter() - closing)
+        files = outputs.completed(settings.outputs.files)
+        tell(report, settings, simulation, spent, files)
+        report.finish(
+            facts(settings, simulation, spent, interrupt.asked) | {"files": files, "failed": outputs.failed}
+        )
         if interrupt.asked:
             name = interrupt.asked.name
             print(
@@ -68,8 +70,9 @@ def run(settings: RunCommandSettings) -> int:
             return interrupt.asked.code
         if server:
             told = "mjwrap run: the run is complete and still served; press Ctrl-C to stop"
-            return serve_until_stopped(server, lambda: print(told, file=sys.stderr))
-        return 0
+            served = serve_until_stopped(server, lambda: print(told, file=sys.stderr))
+            return served or (RUN_FAILED if outputs.failed else 0)
+        return RUN_FAILED if outputs.failed else 0
 
 
 def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None:
@@ -83,14 +86,21 @@ def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None
     return server
 
 
-def advance(simulation: Simulation, logs: list[Log], interrupt: Interrupt) -> WallTime:
+def advance(simulation: Simulation, outputs: Outputs, interrupt: Interrupt) -> WallTime:
     """Run with a progress bar until the end or a signal."""
     bar = progress_bar(simulation.duration, "s", "simulating")
     with contextlib.closing(bar):
+        logs = [outputs.log] if outputs.any_logs else []
         return simulation.advance(logs, progress=bar.update, stopped=lambda: interrupt.asked)
 
 
-def tell(report: Report, settings: RunCommandSettings, simulation: Simulation, spent: WallTime) -> None:
+def tell(
+    report: Report,
+    settings: RunCommandSettings,
+    simulation: Simulation,
+    spent: WallTime,
+    files: dict[str, str],
+) -> None:
     """Print the settings, the speed and the problems of the run, and its files."""
     engine, muscles = simulation.engine, simulation.muscles
     simulated = engine.data.time
@@ -111,7 +121,7 @@ def tell(report: Report, settings: RunCommandSettings, simulation: Simulation, s
         report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
-    for what, path in settings.outputs.files.items():
+    for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
 
 
@@ -134,7 +144,6 @@ def facts(
         "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,
         "paths_not_found": engine.failures(),
-        "files": settings.outputs.files,
     }
 
 

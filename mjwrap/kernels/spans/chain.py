@@ -16,6 +16,7 @@ from mjwrap.kernels.geometry.dispatch import is_surface_kind
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.spans.cold_start import path_length
 from mjwrap.kernels.spans.end_inside import has_valid_length
+from mjwrap.kernels.spans.saved_solutions import discard_invalid_solutions
 from mjwrap.kernels.spans.span_solver import solve_span
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.tangency_error import evaluate
@@ -66,6 +67,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
                 e = i
             else:
                 code, part, error, i, e = solve_span(start, k, ends, node, tol, direct)
+            discard_invalid_solutions(start, k, node)
             if not math.isfinite(part):
                 part, code = straight, lay.NOT_CONVERGED
             if not math.isfinite(error):

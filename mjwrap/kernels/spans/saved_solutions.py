@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.geodesics import geodesic
@@ -25,6 +27,25 @@ def restore_solutions(lo, hi, ends, node, column):
             node[k, S_MODE + i] = node[k, column + i]
         if node[k, S_MODE] == lay.TOUCHED:
             geodesic(k, node, ends[0], ends[1], ends[2])
+
+
+@jit
+def discard_invalid_solutions(lo, hi, node):
+    """Make the saved solutions of lo..hi finite: a trial that failed may have left NaN in a row that is not touched.
+
+    A free row loses the ends of its string, which then count as unknown; any other row becomes a cold start.
+    """
+    for k in range(lo, hi):
+        total = 0.0
+        for i in range(lay.STATE):
+            total += node[k, S_MODE + i]
+        if not math.isfinite(total):
+            if node[k, S_MODE] != lay.FREE or not math.isfinite(node[k, lay.S_SWEEP]):
+                node[k, S_MODE] = lay.COLD
+                node[k, lay.S_SWEEP] = 0.0
+            for i in range(2, lay.STATE):
+                if not math.isfinite(node[k, S_MODE + i]):
+                    node[k, S_MODE + i] = 0.0
 
 
 @jit

@@ -28,6 +28,7 @@ BOUNDARY_TOL = 1e-4  # accuracy to which a section's boundary is found
 # largest number of times that the hull is corrected where it runs through the section
 MAX_HULL_CORRECTIONS = 3
 HOLLOW_HEIGHT = 0.1  # the hull bridges a hollow if it runs higher above the surface between two columns
+SAMPLES = 24  # points along a half plane at which a section is looked for that AB does not enter
 AT_A = 1e-4  # a section that begins nearer to A than this begins at A
 MAX_BOUNDARY_STEPS = 60  # largest number of steps outwards to a section's boundary
 GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # quadrature of an ellipse's arc
@@ -93,14 +94,17 @@ def _upper_hull(count, size, first, step, top, chain):
 
 
 @jit
-def _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain):
-    """Sample the section at COLUMNS columns and find its upper convex hull; return how many columns are on it."""
+def _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, lift, first, step, top, chain):
+    """Sample the section at COLUMNS columns and find its upper convex hull; return how many columns are on it.
+
+    A column begins `lift` above AB.
+    """
     for i in range(COLUMNS):
         x = first + i * step
         px, py, pz = ax + x * ux, ay + x * uy, az + x * uz
         top[i] = -1.0
-        if 0.0 < x < size and height(node, k, px, py, pz) < 0.0:
-            top[i] = _boundary_height(node, k, px, py, pz, wx, wy, wz, 0.0)
+        if 0.0 < x < size and height(node, k, px + lift * wx, py + lift * wy, pz + lift * wz) < 0.0:
+            top[i] = _boundary_height(node, k, px, py, pz, wx, wy, wz, lift)
     m = _upper_hull(COLUMNS, size, first, step, top, chain)
     # above a column that ends below the hull there may be more of the surface: search its boundary from the hull on
     for _ in range(MAX_HULL_CORRECTIONS):
@@ -176,11 +180,24 @@ def _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size):
     return True
 
 
+@jit
+def height_of_section(k, node, x, y, z, wx, wy, wz, most):
+    """Return how far from (x, y, z), at most, the direction w is deepest inside surface k; -1 if it stays outside."""
+    best, lowest = -1.0, 0.0
+    for i in range(1, SAMPLES + 1):
+        lift = most * i / SAMPLES
+        h = height(node, k, x + lift * wx, y + lift * wy, z + lift * wz)
+        if h < lowest:
+            best, lowest = lift, h
+    return best
+
+
 @no_inline
-def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest):
+def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepest, lift):
     """Write an initial guess for the string over the section in the half plane towards w; return whether there is one.
 
-    u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest.
+    u: unit vector from A to B, `size` apart; deepest: distance from A at which AB is lowest. lift: 0 if AB enters the
+    surface there, else the height above AB at which w does.
     """
     if ellipse_sections(k, node):
         return _guess_on_ellipsoid(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size)
@@ -199,7 +216,9 @@ def guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, deepe
             return False
         step = (hi - lo) / (COLUMNS - 2)
         first = deepest - step * math.ceil((deepest - lo) / step)  # one column stands at the deepest point
-        m = _hull_over_section(k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, first, step, top, chain)
+        m = _hull_over_section(
+            k, node, ax, ay, az, ux, uy, uz, wx, wy, wz, size, lift, first, step, top, chain
+        )
         if m == 0:
             return False
         lo, hi = first + (chain[0] - 1) * step, first + (chain[m - 1] + 1) * step

@@ -19,7 +19,7 @@ from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.traits import branched, hollow
+from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided
 from mjwrap.kernels.geometry.winding import unwrap_angle
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED
 from mjwrap.kernels.wraps.end_on_surface import (
@@ -32,6 +32,7 @@ from mjwrap.kernels.wraps.end_on_surface import (
 )
 from mjwrap.kernels.wraps.initial_guess import (
     guess_in_half_plane,
+    height_of_section,
     perpendicular,
     place_contact,
     place_contact_on_tube,
@@ -42,6 +43,9 @@ SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
+NEAR_HINT = 5  # half planes within 60 degrees of the hint
+THREAD_STARTS = 9  # planes in which a string is led through a ring
+THREAD_TURN = math.pi / 8  # between them
 DIRECTIONS = 12  # number of half planes around AB
 CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
 SAME_BRANCH = 1.0  # winding angles that differ by less belong to the same branch [rad]
@@ -113,9 +117,24 @@ def wrap_by_search(k, ends, node, search):
         if hinted and hollow(k, node):
             place_contact(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
             good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
+            if winds and _asks_to_thread(k, node, ax, ay, az, bx, by, bz):
+                fx, fy = ax + share * dx, ay + share * dy
+                good = (good and _threads(k, node, straight)) or _thread(
+                    k, ends, node, straight, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b
+                )
             if good:
                 node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
                 return inside
+        elif (
+            hinted
+            and not one_sided(k, node)
+            and _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
+            and _search(
+                k, ends, node, ax, ay, az, dx, dy, dz, size, share, True, True, branch, before, False,
+                high_a, high_b, NEAR_HINT,
+            )
+        ):  # fmt: skip
+            return inside
         _leave_free(k, node, straight, low, ax, ay, az, bx, by, bz)
         return inside
     # leave the lost contact where it was: Newton's method over the whole row may find it again
@@ -127,16 +146,110 @@ def wrap_by_search(k, ends, node, search):
     clear = low >= -CLEAR_DEPTH * node[k, SIZE]
     _search(
         k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before, clear,
-        high_a, high_b,
+        high_a, high_b, DIRECTIONS,
     )  # fmt: skip
     return inside
 
 
 @jit
+def _asks_to_thread(k, node, ax, ay, az, bx, by, bz):
+    """Return whether the hint of row k, a ring, is on the inner side of its tube, and AB passes outside the ring.
+
+    AB runs from one side of the ring to the other.
+    """
+    major = node[k, lay.DIM]
+    if math.hypot(node[k, HINT + 1], node[k, HINT + 2]) >= major or not az * bz < 0.0:
+        return False
+    t = az / (az - bz)
+    return math.hypot(ax + t * (bx - ax), ay + t * (by - ay)) > major
+
+
+@jit
+def _threads(k, node, straight):
+    """Return whether the path of the last evaluation passes the other side of the tube than the straight segment.
+
+    straight: the angle that this sweeps about the tube's centre [rad]; a path through the hole sweeps one turn more.
+    """
+    more = abs(winding_angle(k, node) - straight)
+    return SAME_BRANCH < more < 2.0 * math.pi + SAME_BRANCH
+
+
+@jit
+def _thread(k, ends, node, straight, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
+    """Wrap the string from A to B through the hole of row k, a ring; return whether such a path was found.
+
+    (fx, fy): the lowest point of AB; straight: as for `_threads`. The guesses run round the inner side of the tube in
+    planes through the ring's axis, the first next to AB, the last next to the hint.
+    """
+    major, minor = node[k, lay.DIM], node[k, lay.DIM + 1]
+    first, last = math.atan2(fy, fx), math.atan2(node[k, HINT + 2], node[k, HINT + 1])
+    way = 1.0 if bz > az else -1.0
+    for i in range(THREAD_STARTS + 1):
+        # to both sides in turn
+        turn = (i + 1) // 2 * THREAD_TURN
+        azimuth = last if i == THREAD_STARTS else first + (turn if i % 2 == 1 else -turn)
+        c, s = math.cos(azimuth), math.sin(azimuth)
+        # A and B in the plane, from the tube's centre, and the angles at which their tangents touch the tube
+        au, av = ax * c + ay * s - major, -way * abs(az)
+        bu, bv = bx * c + by * s - major, way * abs(bz)
+        from_a = way * math.atan2(av, au) - math.acos(min(minor / math.hypot(au, av), 1.0))
+        to_b = way * math.atan2(bv, bu) + math.acos(min(minor / math.hypot(bu, bv), 1.0))
+        if from_a < 0.0:
+            from_a += 2.0 * math.pi
+        u, v = math.cos(from_a), way * math.sin(from_a)
+        rho = major + minor * u
+        tangent = way * v
+        place_contact(
+            k, node, rho * c, rho * s, minor * v, tangent * c, tangent * s, -way * u,
+            minor * max(from_a - to_b, 0.0),
+        )  # fmt: skip
+        good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
+        if good and _threads(k, node, straight):
+            return True
+    return False
+
+
+@jit
+def _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
+    """Return whether the hint lies behind row k's surface, seen from the lowest point F of the segment A + share d.
+
+    It is beyond the tangent plane of the surface at the point nearest to F, and the surface between F and the hint.
+    """
+    x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
+    fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
+    px, py, pz, nx, ny, nz = project(node, k, fx, fy, fz)
+    if nx * (x - px) + ny * (y - py) + nz * (z - pz) >= 0.0:
+        return False
+    _, _, _, nx, ny, nz = project(node, k, x, y, z)
+    return nx * (x - fx) + ny * (y - fy) + nz * (z - fz) > 0.0
+
+
+@jit
 def _search(
-    k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, cold, branch, before, clear, high_a, high_b
+    k,
+    ends,
+    node,
+    ax,
+    ay,
+    az,
+    dx,
+    dy,
+    dz,
+    size,
+    share,
+    hinted,
+    cold,
+    branch,
+    before,
+    clear,
+    high_a,
+    high_b,
+    most,
 ):
-    """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found."""
+    """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found.
+
+    most: number of half planes to try. Returns whether a path was found.
+    """
     # u along AB; w perpendicular to it, from AB's lowest point towards the hint or along the normal; v = u x w
     ux, uy, uz = dx / size, dy / size, dz / size
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
@@ -153,34 +266,31 @@ def _search(
         wx, wy, wz = wx / length, wy / length, wz / length
     vx, vy, vz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
     winds = branched(k, node) and node[k, lay.TOUCH] == 0.0
+    # beyond the hint: how far from AB, which is clear of the surface, a section is looked for
+    above = 0.0
+    if most < DIRECTIONS:
+        above = length + node[k, SIZE]
     found, best, fresh = False, 0.0, -1
     guessed = False
     j = 0
     # the best solution so far, then the first guess
     memory = carray(stack(), (80,))
-    for j in range(DIRECTIONS):
+    for j in range(most):
         # to both sides in turn: 0, 1, -1, 2, -2, ... twelfths of a turn
         turn = (j + 1) // 2 * (2.0 * math.pi / DIRECTIONS)
         c, s = math.cos(turn), math.sin(turn) if j % 2 == 1 else -math.sin(turn)
         # hooked: AB is clear, so that no section lies in its way; guesses all round the tube instead
         if clear:
             place_contact_on_tube(k, node, fx, fy, fz, dx, dy, dz, j * (2.0 * math.pi / DIRECTIONS))
-        elif not guess_in_half_plane(
-            k,
-            node,
-            ax,
-            ay,
-            az,
-            ux,
-            uy,
-            uz,
-            c * wx + s * vx,
-            c * wy + s * vy,
-            c * wz + s * vz,
-            size,
-            share * size,
-        ):
-            continue
+        else:
+            gx, gy, gz = c * wx + s * vx, c * wy + s * vy, c * wz + s * vz
+            lift = 0.0
+            if above > 0.0 and not ellipse_sections(k, node):
+                lift = height_of_section(k, node, fx, fy, fz, gx, gy, gz, above)
+            if lift < 0.0 or not guess_in_half_plane(
+                k, node, ax, ay, az, ux, uy, uz, gx, gy, gz, size, share * size, lift
+            ):
+                continue
         if not guessed:
             guessed = True
             for i in range(lay.STATE):
@@ -218,7 +328,7 @@ def _search(
     node[k, S_MODE] = TOUCHED
     # if the best one was the last that was tried, the row still holds its evaluation
     if found and fresh == j:
-        return
+        return found
     node[k, lay.W_WRAP_ERROR] = -1.0
     if found or guessed:
         start = 0 if found else lay.STATE
@@ -227,3 +337,4 @@ def _search(
     else:
         place_contact(k, node, fx, fy, fz, ux, uy, uz, 0.0)
     geodesic(k, node, ends[0], ends[1], ends[2])
+    return found
