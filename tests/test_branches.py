@@ -47,9 +47,10 @@ def drawn(rng: np.random.Generator) -> tuple[Any, Any, list[mw.Obstacle]]:
             )
         else:
             surface = (mw.Cylinder, mw.Sphere)[kind - 2](rng.uniform(0.05, 0.5))
-        hint = rng.normal(size=3) * 0.5 if rng.random() < 0.8 else None
-        pos = np.array([i + 1.0, 0.0, 0.0]) + rng.normal(size=3) * 0.3
-        obstacles.append(mw.Obstacle(surface, pos=pos, quat=rng.normal(size=4), hint=hint))
+        hint = tuple(rng.normal(size=3) * 0.5) if rng.random() < 0.8 else None
+        pos = tuple(np.array([i + 1.0, 0.0, 0.0]) + rng.normal(size=3) * 0.3)
+        quat = tuple(rng.normal(size=4))
+        obstacles.append(mw.Obstacle(surface, pos=pos, quat=quat, hint=hint))
     origin, insertion = rng.normal(size=3) * 0.3, np.array([n + 1.0, 0.0, 0.0]) + rng.normal(size=3) * 0.3
     return origin, origin if rng.random() < 0.05 else insertion, obstacles
 

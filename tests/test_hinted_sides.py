@@ -42,7 +42,7 @@ def test_cold_is_warm_while_the_string_is_drawn_off_the_hinted_side(kind: str) -
         along = np.array([-out[1], out[0], rng.uniform(-0.4, 0.4)])
         along *= rng.uniform(1.2, 4.0) * max(extent[0], extent[1], 0.05) / np.linalg.norm(along)
         level = np.array([0.0, 0.0, height])
-        row = [mw.Obstacle(surface, hint=side * rng.uniform(1.05, 1.6) + level)]
+        row = [mw.Obstacle(surface, hint=tuple(side * rng.uniform(1.05, 1.6) + level))]
         branch = None
         for shift in np.linspace(0.5, -4.0, 61):
             origin, insertion = (
