@@ -97,7 +97,7 @@ def test_an_interrupt_waits_until_the_machine_code_is_there() -> None:
         def compile(self, sig):
             if self.first:
                 self.first = False
-                raise KeyboardInterrupt
+                signal.raise_signal(signal.SIGINT)
             return super().compile(sig)
 
     before = signal.getsignal(signal.SIGINT)

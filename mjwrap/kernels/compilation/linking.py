@@ -13,7 +13,10 @@ import _thread
 import ctypes
 import hashlib
 import importlib
+import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -35,7 +38,8 @@ OPTIONS: dict[str, Any] = {
     "_nrt": False,  # no counting of references on every array handed on; no new arrays either
 }
 
-INTERRUPT_DELAY = 0.05  # [s] delay of an interrupt that came during a deferred compilation
+SIGNAL_DELAY = 0.05  # [s] after which a signal is delivered that came during a deferred compilation
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class Kernel(Dispatcher):
@@ -127,26 +131,41 @@ class Deferred(NotInlined):
         return _call(self, args, self._returns, args, callee)
 
     def _provide(self, args: Any, address: Any) -> None:
-        """Compile or load a version and store its address; an interrupt (Ctrl-C) is raised after that."""
-        interrupted = False
-        while address.value is None:
-            try:
-                self.compile(args)
-                cres = self.overloads[args]
-                if cres.fndesc.restype != self._returns:
-                    raise TypeError(
-                        f"{self.py_func.__name__} returns {cres.fndesc.restype}, not {self._returns}"
-                    )
-                address.value = cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name)
-            except KeyboardInterrupt:
-                interrupted = True
-        # an exception raised inside a callback would be lost: raise it after the caller has returned
-        if interrupted:
-            threading.Timer(INTERRUPT_DELAY, _thread.interrupt_main).start()
+        """Compile or load a version and store its address; signals wait until this is done."""
+        with _signals_held():
+            self.compile(args)
+            cres = self.overloads[args]
+            if cres.fndesc.restype != self._returns:
+                raise TypeError(f"{self.py_func.__name__} returns {cres.fndesc.restype}, not {self._returns}")
+            address.value = cres.library.get_pointer_to_function(cres.fndesc.llvm_func_name)
 
     def load(self, args: Any) -> None:
         """Define the symbols of a version; runs before machine code that calls them is loaded."""
         self.get_overload(args)
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Deliver signals that have a handler in Python some time after a with block, not inside it.
+
+    The block runs inside a call from compiled code, and calls LLVM, which calls Python: an exception that a handler
+    raises in there would be lost, and would end the process if LLVM waited for a result.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
+    held: list[int] = []
+    for number in (number for number, handler in handlers.items() if callable(handler)):
+        signal.signal(number, lambda received, _: held.append(received))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            if callable(handler):
+                signal.signal(number, handler)
+        for number in dict.fromkeys(held):
+            threading.Timer(SIGNAL_DELAY, _thread.interrupt_main, [number]).start()
 
 
 def _symbol(kernel: Any, args: Any) -> str:
