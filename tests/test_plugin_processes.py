@@ -156,6 +156,17 @@ def test_other_models_are_pickled_as_mujoco_does() -> None:
         assert type(pickle.loads(pickle.dumps(value))) is type(value)
 
 
+def test_models_with_other_plugins_only_are_pickled_as_mujoco_does() -> None:
+    spec = mujoco.MjSpec.from_string(SCENES[SCENE])
+    spec.activate_plugin("mjwrap.probe")  # of the verification: it does nothing
+    spec.add_plugin(name="other", plugin_name="mjwrap.probe", active=True)
+    model = spec.compile()
+    assert model.nplugin == 1
+    for value in (model, mujoco.MjData(model)):
+        assert announcing._reduce(value)[0] is not announcing.restore
+        assert pickle.loads(pickle.dumps(value)) is not None
+
+
 @pytest.mark.parametrize("protocol", range(2, pickle.HIGHEST_PROTOCOL + 1))
 def test_every_protocol_keeps_the_motion(protocol: int) -> None:
     model = installed()

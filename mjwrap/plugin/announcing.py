@@ -91,13 +91,16 @@ def _init(model: int, data: int, instance: int) -> int:
 
 
 def _reduce(value: Any) -> tuple[Any, ...]:
-    """Return how to pickle a model or data: as MuJoCo does it, but `restore` reads those with a plugin."""
-    if getattr(value, "model", value).nplugin == 0:
-        reduced: tuple[Any, ...] = value.__reduce_ex__(4)
-        return reduced
-    from mjwrap.plugin.mujoco_c.registration import PLUGIN_NAME, slot_of
+    """Return how to pickle a model or data: as MuJoCo does it, but `restore` reads those with mjwrap's."""
+    model = getattr(value, "model", value)
+    if model.nplugin:
+        from mjwrap.mjcf.marks import own_instances
+        from mjwrap.plugin.mujoco_c.registration import PLUGIN_NAME, slot_of
 
-    return restore, (type(value), value.__getstate__(), slot_of(PLUGIN_NAME))
+        if own_instances(model):
+            return restore, (type(value), value.__getstate__(), slot_of(PLUGIN_NAME))
+    reduced: tuple[Any, ...] = value.__reduce_ex__(4)
+    return reduced
 
 
 def restore(kind: Any, state: bytes, slot: int) -> Any:
