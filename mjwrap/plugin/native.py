@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import copy
-
 import mujoco
 
-from mjwrap.mjcf import marks, read_declarations
-from mjwrap.model.takeover import Takeover
+from mjwrap.mjcf import read_declarations
 from mjwrap.plugin.readout import instances
 from mjwrap.plugin.spec.configuration import TRANSMISSION, configuration_at
-from mjwrap.plugin.spec.tendons import restore_tendons
+from mjwrap.plugin.uninstalling import without_plugin
 
 
 def native(model: mujoco.MjModel) -> dict[str, str]:
@@ -20,12 +17,9 @@ def native(model: mujoco.MjModel) -> dict[str, str]:
     has no plugin.
     """
     configurations = [configuration_at(model._address, instance) for instance in instances(model)]
-    twin = copy.copy(model)
-    marks.zero_disabled_ranges(twin)
-    restore_tendons(twin)
+    before = without_plugin(model)
     found: dict[str, str] = {}
-    with Takeover(twin).original_limits():
-        for mode in sorted({each.mode for each in configurations}):
-            found |= read_declarations(twin, transmission=mode == TRANSMISSION).native
+    for mode in sorted({each.mode for each in configurations}):
+        found |= read_declarations(before, transmission=mode == TRANSMISSION).native
     taken = {name for each in configurations for name in each.muscles}
     return {name: reason for name, reason in found.items() if name not in taken}
