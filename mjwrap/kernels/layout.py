@@ -127,6 +127,7 @@ W_END_TARGET = 155  # 1 while Newton's method moves Q to an end on the surface f
 INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS if a string between two fixed points is held inside the solid
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
+W_UNMET = 159  # 1 where the path passes another side than the hint asks for, once that is tested
 ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`

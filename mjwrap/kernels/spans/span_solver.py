@@ -21,6 +21,7 @@ from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
 from mjwrap.kernels.spans.end_inside import substitute_path
+from mjwrap.kernels.spans.hinted_sides import meet_hints
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
 
@@ -43,6 +44,15 @@ MAX_CONTINUATION_STEPS = 100.0
 def _is_found(status):
     """Return whether there is a path, or it is known that there is none on the present branch."""
     return status == lay.CONVERGED or status == lay.OUT_OF_RANGE or status == lay.NO_GEODESIC
+
+
+@jit
+def _any_hinted(lo, hi, node):
+    """Return whether a row of several has a hint; a lone obstacle is wrapped with its hint between its own ends."""
+    for k in range(lo, hi):
+        if node[k, lay.HINT] > 0.0 and hi > surface_end(lo, hi, node):
+            return True
+    return False
 
 
 @jit
@@ -192,6 +202,10 @@ def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
         status, total, error, i, e = solve_active_set(lo, hi, ends, node, tol, direct)
         iterations += i
         evaluations += e
+        if not found and status == lay.CONVERGED and _any_hinted(lo, hi, node):
+            status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error)
+            iterations += i
+            evaluations += e
     # `chain.solve_motion` takes this as a sign that the extrapolated start was bad
     node[lo, lay.W_RESTARTS] += 1.0
     if status != lay.CONVERGED:
@@ -218,6 +232,9 @@ def solve_span(lo, hi, ends, node, tol, direct):
     # Newton's method writes the error of its first evaluation here; `_moved_far` reads it
     node[lo, W_START_ERROR] = -1.0
     status, total, error, iterations, evaluations = solve_active_set(lo, hi, ends, node, tol, direct)
+    if not warm and status == lay.CONVERGED and _any_hinted(lo, hi, node):
+        status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error)
+        return status, total, error, iterations + i, evaluations + e
     if _is_found(status) and not (warm and _moved_far(lo, hi, ends, node)):
         return status, total, error, iterations, evaluations
     if warm and status != lay.ENDPOINT_INSIDE:

@@ -37,6 +37,7 @@ from mjwrap.kernels.wraps.initial_guess import (
     place_contact,
     place_contact_on_tube,
 )
+from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side, wrap_on_side
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, INSIDE, set_free
 
 SIZE, HINT = lay.SIZE, lay.HINT
@@ -44,8 +45,6 @@ S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 NEAR_HINT = 5  # half planes within 60 degrees of the hint
-THREAD_STARTS = 9  # planes in which a string is led through a ring
-THREAD_TURN = math.pi / 8  # between them
 DIRECTIONS = 12  # number of half planes around AB
 CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
 SAME_BRANCH = 1.0  # winding angles that differ by less belong to the same branch [rad]
@@ -112,23 +111,26 @@ def wrap_by_search(k, ends, node, search):
     # hooked: the straight segment is clear of the surface, but on another branch than the string
     hooked = branch and abs(straight - unwrap_angle(straight, before)) > SAME_BRANCH
     hinted = mode == COLD and node[k, HINT] > 0.0
-    if low >= -CLEAR_DEPTH * node[k, SIZE] and not hooked:
+    clear = low >= -CLEAR_DEPTH * node[k, SIZE]
+    side = asked_side(k, node, az, bz) if hinted and winds else NO_SIDE
+    if side != NO_SIDE and not (clear and is_on_side(k, node, side, straight, ax, ay, az, bx, by, bz)):
+        fx, fy = ax + share * dx, ay + share * dy
+        if wrap_on_side(k, ends, node, side, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
+            node[k, S_SWEEP] = winding_angle(k, node)
+            return inside
+    if clear and not hooked:
         # on the side of the hint there may be a wrap although the straight segment is clear
-        if hinted and hollow(k, node):
+        if hinted and side == NO_SIDE and hollow(k, node):
             place_contact(k, node, node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3], dx, dy, dz, 0.0)
             good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
-            if winds and _asks_to_thread(k, node, ax, ay, az, bx, by, bz):
-                fx, fy = ax + share * dx, ay + share * dy
-                good = (good and _threads(k, node, straight)) or _thread(
-                    k, ends, node, straight, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b
-                )
             if good:
                 node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
                 return inside
         elif (
             hinted
+            and not hollow(k, node)
             and not one_sided(k, node)
-            and _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
+            and hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
             and _search(
                 k, ends, node, ax, ay, az, dx, dy, dz, size, share, True, True, branch, before, False,
                 high_a, high_b, NEAR_HINT,
@@ -143,7 +145,6 @@ def wrap_by_search(k, ends, node, search):
             node[k, S_MODE + i] = node[k, lay.W_LAST + i]
         geodesic(k, node, ends[0], ends[1], ends[2])
         return inside
-    clear = low >= -CLEAR_DEPTH * node[k, SIZE]
     _search(
         k, ends, node, ax, ay, az, dx, dy, dz, size, share, hinted, mode == COLD, branch, before, clear,
         high_a, high_b, DIRECTIONS,
@@ -152,65 +153,7 @@ def wrap_by_search(k, ends, node, search):
 
 
 @jit
-def _asks_to_thread(k, node, ax, ay, az, bx, by, bz):
-    """Return whether the hint of row k, a ring, is on the inner side of its tube, and AB passes outside the ring.
-
-    AB runs from one side of the ring to the other.
-    """
-    major = node[k, lay.DIM]
-    if math.hypot(node[k, HINT + 1], node[k, HINT + 2]) >= major or not az * bz < 0.0:
-        return False
-    t = az / (az - bz)
-    return math.hypot(ax + t * (bx - ax), ay + t * (by - ay)) > major
-
-
-@jit
-def _threads(k, node, straight):
-    """Return whether the path of the last evaluation passes the other side of the tube than the straight segment.
-
-    straight: the angle that this sweeps about the tube's centre [rad]; a path through the hole sweeps one turn more.
-    """
-    more = abs(winding_angle(k, node) - straight)
-    return SAME_BRANCH < more < 2.0 * math.pi + SAME_BRANCH
-
-
-@jit
-def _thread(k, ends, node, straight, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
-    """Wrap the string from A to B through the hole of row k, a ring; return whether such a path was found.
-
-    (fx, fy): the lowest point of AB; straight: as for `_threads`. The guesses run round the inner side of the tube in
-    planes through the ring's axis, the first next to AB, the last next to the hint.
-    """
-    major, minor = node[k, lay.DIM], node[k, lay.DIM + 1]
-    first, last = math.atan2(fy, fx), math.atan2(node[k, HINT + 2], node[k, HINT + 1])
-    way = 1.0 if bz > az else -1.0
-    for i in range(THREAD_STARTS + 1):
-        # to both sides in turn
-        turn = (i + 1) // 2 * THREAD_TURN
-        azimuth = last if i == THREAD_STARTS else first + (turn if i % 2 == 1 else -turn)
-        c, s = math.cos(azimuth), math.sin(azimuth)
-        # A and B in the plane, from the tube's centre, and the angles at which their tangents touch the tube
-        au, av = ax * c + ay * s - major, -way * abs(az)
-        bu, bv = bx * c + by * s - major, way * abs(bz)
-        from_a = way * math.atan2(av, au) - math.acos(min(minor / math.hypot(au, av), 1.0))
-        to_b = way * math.atan2(bv, bu) + math.acos(min(minor / math.hypot(bu, bv), 1.0))
-        if from_a < 0.0:
-            from_a += 2.0 * math.pi
-        u, v = math.cos(from_a), way * math.sin(from_a)
-        rho = major + minor * u
-        tangent = way * v
-        place_contact(
-            k, node, rho * c, rho * s, minor * v, tangent * c, tangent * s, -way * u,
-            minor * max(from_a - to_b, 0.0),
-        )  # fmt: skip
-        good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
-        if good and _threads(k, node, straight):
-            return True
-    return False
-
-
-@jit
-def _hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
+def hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
     """Return whether the hint lies behind row k's surface, seen from the lowest point F of the segment A + share d.
 
     It is beyond the tangent plane of the surface at the point nearest to F, and the surface between F and the hint.

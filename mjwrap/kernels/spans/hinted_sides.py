@@ -1,0 +1,202 @@
+"""Whether a path passes every obstacle on the side of its hint, and cold starts that see to it.
+
+A cold start wraps each obstacle between points that stand for its neighbours' contacts, such as their hints; the side
+that it takes there need not be that of the hint between the contacts of the final path. So each obstacle whose hint is
+not met is wrapped anew there (`meet_hints`). A string that slips off a sphere, or past a fold of an ellipsoid, has left
+the hinted side rightly: the path stands, and `mark_unmet_hints` says so.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba.core import types
+
+from mjwrap.kernels import layout as lay
+from mjwrap.kernels.compilation.jit import deferred, jit
+from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
+from mjwrap.kernels.geometry.geodesics import geodesic
+from mjwrap.kernels.geometry.projection import turn_into_frame
+from mjwrap.kernels.geometry.traits import branched, closed_form
+from mjwrap.kernels.spans.active_set_method import solve_active_set
+from mjwrap.kernels.spans.cold_start import wrap_in_turn
+from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
+from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
+from mjwrap.kernels.tangency.tangency_error import evaluate
+from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side
+from mjwrap.kernels.wraps.search import hint_is_behind
+
+HINT, POS, SIZE, S_MODE, S_ARC = lay.HINT, lay.POS, lay.SIZE, lay.S_MODE, lay.S_ARC
+W_P, W_Q, W_BEST, W_UNMET = lay.W_P, lay.W_Q, lay.W_BEST, lay.W_UNMET
+
+ATTEMPTS = 4  # largest number of times that obstacles are wrapped anew
+PASSES = 3  # of wrapping all obstacles, with the hinted ones
+LEVEL = 1e-9  # a hint that is less far on the other side, in the surface's size, is in the middle
+
+
+@jit
+def _neighbours(k, lo, hi, ends, node):
+    """Return the ends A and B of the string over row k's surface, relative to the base: contacts next to it [m]."""
+    x, y, z = ends[3], ends[4], ends[5]
+    for j in range(k - 1, lo - 1, -1):
+        if node[j, S_MODE] == lay.TOUCHED:
+            x, y, z = node[j, W_Q], node[j, W_Q + 1], node[j, W_Q + 2]
+            break
+    for j in range(surface_end(k, hi, node), hi):
+        if node[j, S_MODE] == lay.TOUCHED:
+            return x, y, z, node[j, W_P], node[j, W_P + 1], node[j, W_P + 2]
+    return x, y, z, ends[6], ends[7], ends[8]
+
+
+@jit
+def _middle(k, ends, node):
+    """Return the middle of row k's geodesic and the normal there, in S."""
+    arc = node[k, S_ARC]
+    node[k, S_ARC] = 0.5 * arc
+    geodesic(k, node, ends[0], ends[1], ends[2])
+    x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
+    x, y, z = turn_into_frame(node, k, node[k, W_Q] - x, node[k, W_Q + 1] - y, node[k, W_Q + 2] - z)
+    nx, ny, nz = turn_into_frame(node, k, node[k, lay.W_NQ], node[k, lay.W_NQ + 1], node[k, lay.W_NQ + 2])
+    node[k, S_ARC] = arc
+    geodesic(k, node, ends[0], ends[1], ends[2])
+    return x, y, z, nx, ny, nz
+
+
+@jit
+def _ring_is_met(k, hi, node, ax, ay, az, bx, by, bz):
+    """Return whether the string from A to B, in S, passes row k, a ring, on the side for which its hint asks."""
+    side = asked_side(k, node, az, bz)
+    further = surface_end(k, hi, node) > k + 1 and node[k + 1, S_MODE] == lay.TOUCHED
+    if side == NO_SIDE:
+        return node[k, S_MODE] == lay.TOUCHED or further or not _hint_is_behind(k, node, ax, ay, az, bx, by, bz)
+    if node[k, S_MODE] != lay.TOUCHED and not further:
+        winding = segment_winding_angle(k, node, ax, ay, az, bx, by, bz)
+    elif node[k, S_MODE] == lay.TOUCHED and further:
+        winding = node[k, lay.S_SWEEP]
+    else:
+        winding = winding_angle(k + 1 if further else k, node)
+    return is_on_side(k, node, side, winding, ax, ay, az, bx, by, bz)
+
+
+@jit
+def _axis_is_met(k, ends, node, ax, ay, az, bx, by, bz):
+    """Return whether the string from A to B, in S, passes the axis of row k's surface on the side of its hint.
+
+    The surface's normal turns to that side, in the middle of the contact or where a free string is nearest. A string
+    that winds a whole turn passes on every side.
+    """
+    if node[k, S_MODE] == lay.TOUCHED:
+        # a tangent covers less than a quarter turn about the axis
+        if abs(winding_angle(k, node)) >= 2.0 * math.pi:
+            return True
+        _, _, _, nx, ny, _ = _middle(k, ends, node)
+    else:
+        _, share = segment_clearance(node, k, ax, ay, az, bx, by, bz)
+        dx, dy, dz = bx - ax, by - ay, bz - az
+        _, _, _, nx, ny, _ = project(node, k, ax + share * dx, ay + share * dy, az + share * dz)
+    return nx * node[k, HINT + 1] + ny * node[k, HINT + 2] >= -LEVEL * node[k, SIZE]
+
+
+@jit
+def _hint_is_behind(k, node, ax, ay, az, bx, by, bz):
+    """Return whether the hint lies behind row k's surface, seen from the segment from A to B."""
+    _, share = segment_clearance(node, k, ax, ay, az, bx, by, bz)
+    return hint_is_behind(k, node, share, ax, ay, az, bx - ax, by - ay, bz - az)
+
+
+@jit
+def _bounded_is_met(k, ends, node, ax, ay, az, bx, by, bz):
+    """Return whether the string from A to B, in S, passes row k's surface on the side of its hint.
+
+    Seen from the lowest point of AB, the middle of the contact and the hint lie on the same side of AB.
+    """
+    if node[k, S_MODE] != lay.TOUCHED:
+        return not _hint_is_behind(k, node, ax, ay, az, bx, by, bz)
+    _, share = segment_clearance(node, k, ax, ay, az, bx, by, bz)
+    dx, dy, dz = bx - ax, by - ay, bz - az
+    square = max(dx * dx + dy * dy + dz * dz, 1e-300)
+    fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
+    mx, my, mz, _, _, _ = _middle(k, ends, node)
+    mx, my, mz = mx - fx, my - fy, mz - fz
+    hx, hy, hz = node[k, HINT + 1] - fx, node[k, HINT + 2] - fy, node[k, HINT + 3] - fz
+    across = mx * hx + my * hy + mz * hz
+    across -= (mx * dx + my * dy + mz * dz) * (hx * dx + hy * dy + hz * dz) / square
+    return across >= -LEVEL * node[k, SIZE] * node[k, SIZE]
+
+
+@jit
+def _is_met(k, lo, hi, ends, node):
+    """Return whether the path of the last evaluation passes row k's surface on the side of its hint."""
+    ax, ay, az, bx, by, bz = _neighbours(k, lo, hi, ends, node)
+    x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
+    ax, ay, az = turn_into_frame(node, k, ax - x, ay - y, az - z)
+    bx, by, bz = turn_into_frame(node, k, bx - x, by - y, bz - z)
+    if not branched(k, node):
+        return _bounded_is_met(k, ends, node, ax, ay, az, bx, by, bz)
+    if closed_form(k, node):
+        return _axis_is_met(k, ends, node, ax, ay, az, bx, by, bz)
+    return _ring_is_met(k, hi, node, ax, ay, az, bx, by, bz)
+
+
+@jit
+def _mark_span(lo, hi, ends, node):
+    """Write to W_UNMET which hints the path over lo..hi does not meet; return how many."""
+    count = 0
+    for k in range(lo, hi):
+        node[k, W_UNMET] = 0.0
+        if node[k, HINT] > 0.0 and node[k, lay.INSIDE] == 0.0 and not _is_met(k, lo, hi, ends, node):
+            node[k, W_UNMET] = 1.0
+            count += 1
+    return count
+
+
+@deferred(types.int64)
+def mark_unmet_hints(lo, hi, ox, oy, oz, ix, iy, iz, node):
+    """Write to W_UNMET which hints the path over nodes lo..hi does not meet; return how many.
+
+    The rows hold the last evaluation of a path from (ox, oy, oz) to (ix, iy, iz), world [m].
+    """
+    count, start = 0, lo
+    ax, ay, az = 0.0, 0.0, 0.0
+    for k in range(lo, hi + 1):
+        if k < hi and node[k, lay.KIND] != lay.VIA:
+            continue
+        bx, by, bz = ix - ox, iy - oy, iz - oz
+        if k < hi:
+            node[k, W_UNMET] = 0.0
+            bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
+        count += _mark_span(start, k, (ox, oy, oz, ax, ay, az, bx, by, bz), node)
+        ax, ay, az = bx, by, bz
+        start = k + 1
+    return count
+
+
+@deferred(types.int64, types.float64, types.float64, types.int64, types.int64)
+def meet_hints(lo, hi, ends, node, tol, length, error):
+    """Wrap the obstacles whose hints are not met anew, after a cold start; returns as `solve_active_set`.
+
+    length, error: of the path over lo..hi, which is converged. It stays where no path meets more hints.
+    """
+    iterations, evaluations = 0, 0
+    unmet = _mark_span(lo, hi, ends, node)
+    for _ in range(ATTEMPTS):
+        if unmet == 0:
+            break
+        save_solutions(lo, hi, node, W_BEST)
+        for k in range(lo, hi):
+            if node[k, W_UNMET] > 0.0:
+                for j in range(k, surface_end(k, hi, node)):
+                    remove_contact(j, node)
+                node[k, S_MODE] = lay.COLD
+        evaluations += wrap_in_turn(lo, hi, ends, node, PASSES, False)
+        status, total, square, i, e = solve_active_set(lo, hi, ends, node, tol, False)
+        iterations += i
+        evaluations += e
+        before = unmet
+        unmet = _mark_span(lo, hi, ends, node)
+        if status != lay.CONVERGED or unmet >= before:
+            restore_solutions(lo, hi, ends, node, W_BEST)
+            evaluate(lo, hi, ends, node)
+            break
+        length, error = total, square
+    return lay.CONVERGED, length, error, iterations, evaluations
