@@ -19,18 +19,20 @@ from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import branched, closed_form
 from mjwrap.kernels.spans.active_set_method import solve_active_set
-from mjwrap.kernels.spans.cold_start import wrap_in_turn
+from mjwrap.kernels.spans.cold_start import next_contact_point
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.tangency.tangency_error import evaluate
 from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side
 from mjwrap.kernels.wraps.search import hint_is_behind
+from mjwrap.kernels.wraps.single import wrap
 
 HINT, POS, SIZE, S_MODE, S_ARC = lay.HINT, lay.POS, lay.SIZE, lay.S_MODE, lay.S_ARC
 W_P, W_Q, W_BEST, W_UNMET = lay.W_P, lay.W_Q, lay.W_BEST, lay.W_UNMET
 
 ATTEMPTS = 4  # largest number of times that obstacles are wrapped anew
-PASSES = 3  # of wrapping all obstacles, with the hinted ones
+SAME = 1e-9  # paths whose lengths differ by a smaller share are the same
+PASSES = 8  # of wrapping all obstacles, with the hinted ones
 LEVEL = 1e-9  # a hint that is less far on the other side, in the surface's size, is in the middle
 
 
@@ -49,13 +51,21 @@ def _neighbours(k, lo, hi, ends, node):
 
 
 @jit
+def _contact_in_frame(k, column, base, node):
+    """Return the contact point of row k that begins at `column`, W_P or W_Q, in S."""
+    x, y, z = node[k, POS] - base[0], node[k, POS + 1] - base[1], node[k, POS + 2] - base[2]
+    return turn_into_frame(
+        node, k, node[k, column] - x, node[k, column + 1] - y, node[k, column + 2] - z
+    )
+
+
+@jit
 def _middle(k, ends, node):
     """Return the middle of row k's geodesic and the normal there, in S."""
     arc = node[k, S_ARC]
     node[k, S_ARC] = 0.5 * arc
     geodesic(k, node, ends[0], ends[1], ends[2])
-    x, y, z = node[k, POS] - ends[0], node[k, POS + 1] - ends[1], node[k, POS + 2] - ends[2]
-    x, y, z = turn_into_frame(node, k, node[k, W_Q] - x, node[k, W_Q + 1] - y, node[k, W_Q + 2] - z)
+    x, y, z = _contact_in_frame(k, W_Q, ends[:3], node)
     nx, ny, nz = turn_into_frame(node, k, node[k, lay.W_NQ], node[k, lay.W_NQ + 1], node[k, lay.W_NQ + 2])
     node[k, S_ARC] = arc
     geodesic(k, node, ends[0], ends[1], ends[2])
@@ -63,7 +73,7 @@ def _middle(k, ends, node):
 
 
 @jit
-def _ring_is_met(k, hi, node, ax, ay, az, bx, by, bz):
+def _ring_is_met(k, hi, base, node, ax, ay, az, bx, by, bz):
     """Return whether the string from A to B, in S, passes row k, a ring, on the side for which its hint asks."""
     side = asked_side(k, node, az, bz)
     further = surface_end(k, hi, node) > k + 1 and node[k + 1, S_MODE] == lay.TOUCHED
@@ -72,7 +82,11 @@ def _ring_is_met(k, hi, node, ax, ay, az, bx, by, bz):
     if node[k, S_MODE] != lay.TOUCHED and not further:
         winding = segment_winding_angle(k, node, ax, ay, az, bx, by, bz)
     elif node[k, S_MODE] == lay.TOUCHED and further:
-        winding = node[k, lay.S_SWEEP]
+        # the segment between the two contacts belongs to the winding angles of both
+        qx, qy, qz = _contact_in_frame(k, W_Q, base, node)
+        px, py, pz = _contact_in_frame(k + 1, W_P, base, node)
+        winding = winding_angle(k, node) + winding_angle(k + 1, node)
+        winding -= segment_winding_angle(k, node, qx, qy, qz, px, py, pz)
     else:
         winding = winding_angle(k + 1 if further else k, node)
     return is_on_side(k, node, side, winding, ax, ay, az, bx, by, bz)
@@ -135,7 +149,7 @@ def _is_met(k, lo, hi, ends, node):
         return _bounded_is_met(k, ends, node, ax, ay, az, bx, by, bz)
     if closed_form(k, node):
         return _axis_is_met(k, ends, node, ax, ay, az, bx, by, bz)
-    return _ring_is_met(k, hi, node, ax, ay, az, bx, by, bz)
+    return _ring_is_met(k, hi, ends[:3], node, ax, ay, az, bx, by, bz)
 
 
 @jit
@@ -148,6 +162,27 @@ def _mark_span(lo, hi, ends, node):
             node[k, W_UNMET] = 1.0
             count += 1
     return count
+
+
+@jit
+def _wrap_by_hints(lo, hi, ends, node, all_sides):
+    """Wrap every obstacle in turn, PASSES times, those with unmet hints anew by their hints; return the passes.
+
+    all_sides: also those with hints that are met, where the side is topological.
+    """
+    for _ in range(PASSES):
+        x, y, z = ends[3], ends[4], ends[5]
+        for k in range(lo, hi):
+            if node[k, W_UNMET] > 0.0 or (all_sides and node[k, HINT] > 0.0 and branched(k, node)):
+                for j in range(k, surface_end(k, hi, node)):
+                    remove_contact(j, node)
+                node[k, S_MODE] = lay.COLD
+            qx, qy, qz = next_contact_point(k, hi, ends, node, False)
+            node[k, lay.W_WRAP_ERROR] = -1.0
+            wrap(k, node, ends[0], ends[1], ends[2], x, y, z, qx, qy, qz, False)
+            if node[k, S_MODE] == lay.TOUCHED:
+                x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
+    return PASSES
 
 
 @deferred(types.int64)
@@ -179,24 +214,24 @@ def meet_hints(lo, hi, ends, node, tol, length, error):
     """
     iterations, evaluations = 0, 0
     unmet = _mark_span(lo, hi, ends, node)
-    for _ in range(ATTEMPTS):
+    least, last = unmet, length
+    save_solutions(lo, hi, node, W_BEST)
+    for attempt in range(ATTEMPTS):
         if unmet == 0:
             break
-        save_solutions(lo, hi, node, W_BEST)
-        for k in range(lo, hi):
-            if node[k, W_UNMET] > 0.0:
-                for j in range(k, surface_end(k, hi, node)):
-                    remove_contact(j, node)
-                node[k, S_MODE] = lay.COLD
-        evaluations += wrap_in_turn(lo, hi, ends, node, PASSES, False)
+        evaluations += _wrap_by_hints(lo, hi, ends, node, attempt > 0)
         status, total, square, i, e = solve_active_set(lo, hi, ends, node, tol, False)
         iterations += i
         evaluations += e
         before = unmet
         unmet = _mark_span(lo, hi, ends, node)
-        if status != lay.CONVERGED or unmet >= before:
-            restore_solutions(lo, hi, ends, node, W_BEST)
-            evaluate(lo, hi, ends, node)
+        if attempt > 0 and unmet == before and abs(total - last) <= SAME * total:
             break
-        length, error = total, square
+        last = total
+        if status == lay.CONVERGED and unmet < least:
+            least, length, error = unmet, total, square
+            save_solutions(lo, hi, node, W_BEST)
+    if unmet > 0:
+        restore_solutions(lo, hi, ends, node, W_BEST)
+        evaluate(lo, hi, ends, node)
     return lay.CONVERGED, length, error, iterations, evaluations

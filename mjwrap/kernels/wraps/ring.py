@@ -13,7 +13,9 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.clearance import tube_angle
 from mjwrap.kernels.geometry.winding import TWO_PI, winding_about_tube
-from mjwrap.kernels.wraps.end_on_surface import polish_from_low_ends
+from mjwrap.kernels.tangency.certify import is_local_minimum
+from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
+from mjwrap.kernels.wraps.end_on_surface import LOCAL_STEPS, LOCAL_TOL, polish_from_low_ends
 from mjwrap.kernels.wraps.initial_guess import place_contact
 
 DIM, HINT = lay.DIM, lay.HINT
@@ -74,13 +76,65 @@ def wrap_on_side(k, ends, node, side, ax, ay, az, bx, by, bz, fx, fy, high_a, hi
         reach_b = math.acos(min(minor / math.hypot(bu, bz), 1.0))
         start = angle_a + way * reach_a
         arc = way * (angle_b - start) - reach_b + (TWO_PI if side == THROUGH else 0.0)
-        u, v = math.cos(start), up * math.sin(start)
-        rho = major + minor * u
-        place_contact(
-            k, node, rho * c, rho * s, minor * v, -way * up * v * c, -way * up * v * s, way * up * u,
-            minor * max(arc, 0.0),
-        )  # fmt: skip
+        _place_circle(k, node, azimuth, start, up, way, arc)
         good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
         if good and is_on_side(k, node, side, winding_about_tube(k, node), ax, ay, az, bx, by, bz):
             return True
+    return side == THROUGH and _touch_twice(k, ends, node, ax, ay, az, bx, by, bz)
+
+
+@jit
+def _touch_twice(k, ends, node, ax, ay, az, bx, by, bz):
+    """Lead the string from A to B through the hole of row k so that it touches the ring on both sides of the hole.
+
+    A string that runs nearly in the ring's plane dives through the hole between the near part of the tube and the far
+    one. The guesses are circles round the tube, to the ring's centre and from there. The second contact goes to the
+    surface's second row. Returns whether such a path was found.
+    """
+    if not (k + 1 < node.shape[0] and node[k + 1, lay.TOUCH] > 0.0):
+        return False
+    reach = math.acos(min(node[k, DIM + 1] / node[k, DIM], 1.0))  # of the tangent from the centre
+    arc_a, arc_b = _arc_to_centre(k, node, ax, ay, az, reach), _arc_to_centre(k, node, bx, by, bz, reach)
+    if arc_a <= 0.0 or arc_b <= 0.0:
+        return False
+    up_a, up_b = math.copysign(1.0, az), math.copysign(1.0, bz)
+    _place_circle(k, node, math.atan2(ay, ax), math.pi - reach - arc_a, up_a, 1.0, arc_a)
+    _place_circle(k + 1, node, math.atan2(by, bx), math.pi - reach, up_b, -1.0, arc_b)
+    major = node[k, DIM]
+    plain = tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az)
+    node[k, lay.S_SWEEP], node[k + 1, lay.S_SWEEP] = plain + math.copysign(TWO_PI, az), 0.0
+    error, _, _ = newton(k, k + 2, ends, node, LOCAL_TOL, LOCAL_STEPS, NOT_EVALUATED)
+    node[k, lay.W_WRAP_ERROR], node[k + 1, lay.W_WRAP_ERROR] = -1.0, -1.0
+    good = error <= LOCAL_TOL and node[k, lay.S_ARC] >= 0.0 and node[k + 1, lay.S_ARC] >= 0.0
+    if good and is_local_minimum(k, k + 2, node):
+        return True
+    node[k + 1, lay.S_MODE] = lay.FREE
+    for i in range(7):
+        node[k + 1, lay.S_P + i] = 0.0
     return False
+
+
+@jit
+def _arc_to_centre(k, node, x, y, z, reach):
+    """Return the angle of the arc round the tube of a string from (x, y, z) to the ring's centre, in a plane [rad].
+
+    reach: the angle that the tangent from the centre covers; negative where the string does not touch.
+    """
+    out = math.hypot(x, y) - node[k, DIM]
+    far = math.hypot(out, z)
+    return math.pi - reach - math.atan2(abs(z), out) - math.acos(min(node[k, DIM + 1] / far, 1.0))
+
+
+@jit
+def _place_circle(k, node, azimuth, angle, up, way, arc):
+    """Start row k's geodesic on a circle round the tube, at an angle of it, upwards of the plane or (up = -1) below.
+
+    way: 1 in the direction of the angle, -1 against it; arc: angle that the geodesic covers [rad].
+    """
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    u, v = math.cos(angle), up * math.sin(angle)
+    rho, minor = node[k, DIM] + node[k, DIM + 1] * u, node[k, DIM + 1]
+    place_contact(
+        k, node, rho * c, rho * s, minor * v, -way * up * v * c, -way * up * v * s, way * up * u,
+        minor * max(arc, 0.0),
+    )  # fmt: skip
