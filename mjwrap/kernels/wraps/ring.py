@@ -25,6 +25,7 @@ THROUGH = 1
 OUTSIDE = 2
 PLANES = 9  # in which a string is led round the tube
 TURN = math.pi / 8  # between them
+HOLE_POINTS = 4  # places in the hole through which a string is led that touches the ring twice
 
 
 @jit
@@ -80,34 +81,37 @@ def wrap_on_side(k, ends, node, side, ax, ay, az, bx, by, bz, fx, fy, high_a, hi
         good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
         if good and is_on_side(k, node, side, winding_about_tube(k, node), ax, ay, az, bx, by, bz):
             return True
-    return side == THROUGH and _touch_twice(k, ends, node, ax, ay, az, bx, by, bz)
+    return side == THROUGH and _touch_twice(k, ends, node, ax, ay, az, bx, by, bz, fx, fy)
 
 
 @jit
-def _touch_twice(k, ends, node, ax, ay, az, bx, by, bz):
+def _touch_twice(k, ends, node, ax, ay, az, bx, by, bz, fx, fy):
     """Lead the string from A to B through the hole of row k so that it touches the ring on both sides of the hole.
 
     A string that runs nearly in the ring's plane dives through the hole between the near part of the tube and the far
-    one. The guesses are circles round the tube, to the ring's centre and from there. The second contact goes to the
-    surface's second row. Returns whether such a path was found.
+    one. The guesses are circles round the tube to a point M in the hole and from there; M is the ring's centre first,
+    then nearer and nearer to (fx, fy), the lowest point of AB. The second contact goes to the surface's second row.
+    Returns whether such a path was found.
     """
     if not (k + 1 < node.shape[0] and node[k + 1, lay.TOUCH] > 0.0):
         return False
-    reach = math.acos(min(node[k, DIM + 1] / node[k, DIM], 1.0))  # of the tangent from the centre
-    arc_a, arc_b = _arc_to_centre(k, node, ax, ay, az, reach), _arc_to_centre(k, node, bx, by, bz, reach)
-    if arc_a <= 0.0 or arc_b <= 0.0:
-        return False
-    up_a, up_b = math.copysign(1.0, az), math.copysign(1.0, bz)
-    _place_circle(k, node, math.atan2(ay, ax), math.pi - reach - arc_a, up_a, 1.0, arc_a)
-    _place_circle(k + 1, node, math.atan2(by, bx), math.pi - reach, up_b, -1.0, arc_b)
-    major = node[k, DIM]
-    plain = tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az)
-    node[k, lay.S_SWEEP], node[k + 1, lay.S_SWEEP] = plain + math.copysign(TWO_PI, az), 0.0
-    error, _, _ = newton(k, k + 2, ends, node, LOCAL_TOL, LOCAL_STEPS, NOT_EVALUATED)
-    node[k, lay.W_WRAP_ERROR], node[k + 1, lay.W_WRAP_ERROR] = -1.0, -1.0
-    good = error <= LOCAL_TOL and node[k, lay.S_ARC] >= 0.0 and node[k + 1, lay.S_ARC] >= 0.0
-    if good and is_local_minimum(k, k + 2, node):
-        return True
+    major, minor = node[k, DIM], node[k, DIM + 1]
+    aside = math.hypot(fx, fy)
+    for i in range(HOLE_POINTS):
+        share = i / HOLE_POINTS * (major - minor) / aside if aside > 0.0 else 0.0
+        x, y = share * fx, share * fy
+        # M is inside the hole, so that both contacts exist
+        one = _place_arc_to_hole(k, k, node, ax, ay, az, x, y, True)
+        two = _place_arc_to_hole(k, k + 1, node, bx, by, bz, x, y, False)
+        if not (one or two):
+            break
+        plain = tube_angle(major, bx, by, bz) - tube_angle(major, ax, ay, az)
+        node[k, lay.S_SWEEP], node[k + 1, lay.S_SWEEP] = plain + math.copysign(TWO_PI, az), 0.0
+        error, _, _ = newton(k, k + 2, ends, node, LOCAL_TOL, LOCAL_STEPS, NOT_EVALUATED)
+        node[k, lay.W_WRAP_ERROR], node[k + 1, lay.W_WRAP_ERROR] = -1.0, -1.0
+        good = error <= LOCAL_TOL and node[k, lay.S_ARC] >= 0.0 and node[k + 1, lay.S_ARC] >= 0.0
+        if good and is_local_minimum(k, k + 2, node):
+            return True
     node[k + 1, lay.S_MODE] = lay.FREE
     for i in range(7):
         node[k + 1, lay.S_P + i] = 0.0
@@ -115,14 +119,35 @@ def _touch_twice(k, ends, node, ax, ay, az, bx, by, bz):
 
 
 @jit
-def _arc_to_centre(k, node, x, y, z, reach):
-    """Return the angle of the arc round the tube of a string from (x, y, z) to the ring's centre, in a plane [rad].
+def _place_arc_to_hole(k, row, node, x, y, z, mx, my, inwards):
+    """Start a row of ring k with a circle over the tube between (x, y, z) and M in the hole; return whether it touches.
 
-    reach: the angle that the tangent from the centre covers; negative where the string does not touch.
+    inwards: towards M, else away from it.
     """
-    out = math.hypot(x, y) - node[k, DIM]
-    far = math.hypot(out, z)
-    return math.pi - reach - math.atan2(abs(z), out) - math.acos(min(node[k, DIM + 1] / far, 1.0))
+    major, minor = node[k, DIM], node[k, DIM + 1]
+    # the point of the tube's middle above which the string passes: M + s (dx, dy)
+    dx, dy = x - mx, y - my
+    far = math.hypot(dx, dy)
+    if far == 0.0:
+        return False
+    dx, dy = dx / far, dy / far
+    along = mx * dx + my * dy
+    s = math.sqrt(max(along * along + major * major - mx * mx - my * my, 0.0)) - along
+    out = far - s
+    if s <= minor or math.hypot(out, z) <= minor:
+        return False
+    # angles about that point: 0 outwards, a quarter turn towards the side of z, half a turn towards M
+    last = math.pi - math.acos(minor / s)
+    first = math.atan2(abs(z), out) + math.acos(minor / math.hypot(out, z))
+    up = math.copysign(1.0, z)
+    start, way = (first, 1.0) if inwards else (last, -1.0)
+    c, v = math.cos(start), math.sin(start)
+    cx, cy = mx + s * dx, my + s * dy
+    place_contact(
+        row, node, cx + minor * c * dx, cy + minor * c * dy, up * minor * v, -way * v * dx, -way * v * dy, way * up * c,
+        minor * max(last - first, 0.0),
+    )  # fmt: skip
+    return last > first
 
 
 @jit
