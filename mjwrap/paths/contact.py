@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mjwrap.paths.scene import Array
 
@@ -16,12 +16,17 @@ class Contact:
         P: (3,) first contact point, world [m]; None if not active.
         Q: (3,) last contact point, world [m]; None if not active.
         arc_length: length of the geodesic from P to Q [m].
-        second: second contact with the same surface, after a hollow that the path bridges (such as the hole of a
-            torus); None if there is none.
+        touches: all contacts with the same surface in the order of the path, this one first; several where the path
+            bridges a hollow (such as the hole of a torus). Empty if not active.
     """
 
     active: bool
     P: Array | None
     Q: Array | None
     arc_length: float
-    second: Contact | None = None
+    touches: tuple[Contact, ...] = field(default=(), repr=False)
+
+    @property
+    def second(self) -> Contact | None:
+        """The second contact with the same surface; None if there is none."""
+        return self.touches[1] if len(self.touches) > 1 else None

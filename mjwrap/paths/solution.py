@@ -11,7 +11,7 @@ from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import polyline, segments
-from mjwrap.kernels.spans import end_inside
+from mjwrap.kernels.spans import end_inside, hinted_sides
 from mjwrap.paths.contact import Contact
 from mjwrap.paths.derivatives import Derivatives
 from mjwrap.paths.scene import SAVED, Array, Point
@@ -61,25 +61,41 @@ class PathSolution(Derivatives):
         stands_in = known and not self.converged
         list_them = end_inside.list_pulling_segments if stands_in else segments.list_segments
         self._count = list_them(*self._ends, self._node, self._segments, 0)
-        self.contacts = []
+        touches: list[list[Contact]] = []
         for row, k in enumerate(self._owner):
-            contact = self._contact(row)
-            if k == len(self.contacts):
-                self.contacts.append(contact)
-            elif contact.active:
-                first = self.contacts[k]
-                self.contacts[k] = replace(first, second=contact) if first.active else contact
+            if k == len(touches):
+                touches.append([])
+            touches[k] += self._contacts_of_row(row)
+        self.contacts = [
+            replace(found[0], touches=tuple(found)) if found else Contact(False, None, None, 0.0)
+            for found in touches
+        ]
 
-    def _contact(self, index: int) -> Contact:
+    def _contacts_of_row(self, index: int) -> list[Contact]:
         row = self._node[index]
         if row[layout.KIND] == layout.VIA:
             here = row[layout.POS : layout.POS + 3].copy()
-            return Contact(True, here, here.copy(), 0.0)
+            return [Contact(True, here, here.copy(), 0.0)]
         if row[layout.S_MODE] != layout.TOUCHED:
-            return Contact(False, None, None, 0.0)
+            return []
         base = np.array(self._origin)
         first, last = row[layout.W_P : layout.W_P + 3] + base, row[layout.W_Q : layout.W_Q + 3] + base
-        return Contact(True, first, last, float(row[layout.S_ARC]))
+        return [Contact(True, first, last, float(row[layout.S_ARC]))]
+
+    @property
+    def hints_met(self) -> list[bool]:
+        """Whether the path passes each obstacle on the side of its hint; true where there is no hint.
+
+        A path stays CONVERGED where this is false: a string slips off a sphere, or off an ellipsoid past a fold, to
+        the other side. All false if the path is not converged.
+        """
+        if not self.converged:
+            return [False] * len(self.contacts)
+        node = self._node.copy()
+        hinted_sides.mark_unmet_hints(*self._ends, node)
+        met = np.ones(len(self.contacts), dtype=np.bool_)
+        met[self._owner[node[:, layout.W_UNMET] > 0.0]] = False
+        return [bool(value) for value in met]
 
     @property
     def converged(self) -> bool:

@@ -11,8 +11,9 @@ from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import drawn_paths, muscle_paths
 from mjwrap.kernels.solved import segments
-from mjwrap.kernels.spans import end_inside
+from mjwrap.kernels.spans import end_inside, hinted_sides
 from mjwrap.mjcf import Declarations, MuscleDeclaration
+from mjwrap.mjcf.names import name_of
 from mjwrap.model.arrays import Plan
 from mjwrap.model.kinematic_tree import last_dofs
 from mjwrap.paths import Status
@@ -20,6 +21,7 @@ from mjwrap.system.history import History
 from mjwrap.system.state import Evaluation
 
 Array = NDArray[np.float64]
+_GEOM = mujoco.mjtObj.mjOBJ_GEOM
 
 
 class Results:
@@ -95,6 +97,38 @@ class Results:
         return (status != Status.CONVERGED) & (
             (status != Status.ENDPOINT_INSIDE) | (error >= end_inside.NO_SUBSTITUTE)
         )
+
+    @property
+    def hints_met(self) -> NDArray[np.bool_]:
+        """Whether each muscle (n,) passes its surfaces on the sides of their hints or side sites; false without a path.
+
+        A path stays valid where this is false: `unmet_hints` says why that happens.
+        """
+        met = self.status == Status.CONVERGED
+        met[[i for i in range(self.n) if met[i] and self.unmet_hints(i)]] = False
+        return met
+
+    def unmet_hints(self, i: int) -> list[str]:
+        """Return the names of the geoms that muscle i passes on another side than their hint asks for.
+
+        A string slips off a sphere, or off an ellipsoid past a fold, to the other side, and a path may have been led
+        there by the motion since its cold start. Empty for a muscle without a path.
+        """
+        state, plan = self._evaluation(), self._plan
+        if state.status[self._known(i)] != Status.CONVERGED:
+            return []
+        found: list[str] = []
+        for c in np.flatnonzero(plan.routes[:, muscle_paths.R_MUSCLE] == i):
+            lo, hi = (int(x) for x in plan.routes[c, [muscle_paths.R_LO, muscle_paths.R_HI]])
+            drawn = state.segments[lo + int(c) : lo + int(c) + int(state.count[c])]
+            if not len(drawn) or not state.node[lo:hi, layout.HINT].any():
+                continue
+            node, (first, last) = state.node[lo:hi].copy(), (drawn[0], drawn[-1])
+            ends = (*first[segments.G_A : segments.G_A + 3], *last[segments.G_B : segments.G_B + 3])
+            hinted_sides.mark_unmet_hints(0, hi - lo, *(float(x) for x in ends), node)
+            geoms = plan.links[lo:hi, muscle_paths.L_GEOM][node[:, layout.W_UNMET] > 0.0]
+            found += [name_of(self.model, _GEOM, int(geom)) for geom in geoms]
+        return found
 
     @property
     def iterations(self) -> NDArray[np.int64]:

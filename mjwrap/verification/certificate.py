@@ -53,10 +53,10 @@ class Case:
         contacts: list[Contacts] = []
         for contact in sol.contacts:
             contacts.append([])
-            touch: mw.Contact | None = contact
-            while touch is not None and touch.P is not None and touch.Q is not None:
+            for touch in contact.touches:
+                assert touch.P is not None
+                assert touch.Q is not None
                 contacts[-1].append((touch.P, touch.Q, touch.arc_length))
-                touch = touch.second
         return cls(np.asarray(origin, float), np.asarray(insertion, float), obstacles, contacts, sol.length)
 
 

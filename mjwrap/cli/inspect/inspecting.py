@@ -7,6 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
 from mjwrap import MuscleSystem, implausible, length_ranges
 from mjwrap.calibration.joints import JointSpace
 from mjwrap.cli.common.errors import FAULTS, UserError
@@ -53,6 +57,12 @@ def inspect(settings: InspectSettings) -> int:
     report.say(table(model, muscles.declarations))
     for name, reason in muscles.native.items():
         report.say(f"{name}: stays with MuJoCo: {reason}")
+    unmet = _unmet_hints(muscles, rest)
+    for name, geoms in unmet.items():
+        report.say(
+            f"{name}: in the rest pose it passes {', '.join(geoms)} on another side than the hint or side site asks "
+            f"for, where no path was found"
+        )
     ranges = {} if settings.quick else length_ranges(muscles, ranges=joints, base=rest, seed=settings.seed)
     found = implausible(muscles, ranges=ranges, rest=rest)
     report.say(found.table())
@@ -60,6 +70,16 @@ def inspect(settings: InspectSettings) -> int:
         "model": settings.model,
         "muscles": [as_values(model, muscle) for muscle in muscles.declarations],
         "native": muscles.native,
+        "unmet_hints": unmet,
     }
     report.finish(values | found.as_dict())
     return FAULTS if settings.strict and found.findings else 0
+
+
+def _unmet_hints(muscles: MuscleSystem, rest: NDArray[np.float64]) -> dict[str, list[str]]:
+    """Return the geoms that each muscle passes on another side than their hints ask for, after a start in `rest`."""
+    data = mujoco.MjData(muscles.model)
+    data.qpos[:] = rest
+    muscles.forward(data)
+    found = {name: muscles.unmet_hints(i) for i, name in enumerate(muscles.names)}
+    return {name: geoms for name, geoms in found.items() if geoms}

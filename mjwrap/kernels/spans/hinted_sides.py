@@ -14,7 +14,7 @@ from numba.core import types
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
-from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
+from mjwrap.kernels.geometry.dispatch import segment_clearance, segment_winding_angle, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import branched, closed_form
@@ -24,8 +24,8 @@ from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.tangency.tangency_error import evaluate
 from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side
-from mjwrap.kernels.wraps.search import hint_is_behind
-from mjwrap.kernels.wraps.single import wrap
+from mjwrap.kernels.wraps.search import hint_is_behind, hint_outside
+from mjwrap.kernels.wraps.single import sweep_asked_for, wrap
 
 HINT, POS, SIZE, S_MODE, S_ARC = lay.HINT, lay.POS, lay.SIZE, lay.S_MODE, lay.S_ARC
 W_P, W_Q, W_BEST, W_UNMET = lay.W_P, lay.W_Q, lay.W_BEST, lay.W_UNMET
@@ -54,22 +54,19 @@ def _neighbours(k, lo, hi, ends, node):
 def _contact_in_frame(k, column, base, node):
     """Return the contact point of row k that begins at `column`, W_P or W_Q, in S."""
     x, y, z = node[k, POS] - base[0], node[k, POS + 1] - base[1], node[k, POS + 2] - base[2]
-    return turn_into_frame(
-        node, k, node[k, column] - x, node[k, column + 1] - y, node[k, column + 2] - z
-    )
+    return turn_into_frame(node, k, node[k, column] - x, node[k, column + 1] - y, node[k, column + 2] - z)
 
 
 @jit
 def _middle(k, ends, node):
-    """Return the middle of row k's geodesic and the normal there, in S."""
+    """Return the middle of row k's geodesic, in S."""
     arc = node[k, S_ARC]
     node[k, S_ARC] = 0.5 * arc
     geodesic(k, node, ends[0], ends[1], ends[2])
     x, y, z = _contact_in_frame(k, W_Q, ends[:3], node)
-    nx, ny, nz = turn_into_frame(node, k, node[k, lay.W_NQ], node[k, lay.W_NQ + 1], node[k, lay.W_NQ + 2])
     node[k, S_ARC] = arc
     geodesic(k, node, ends[0], ends[1], ends[2])
-    return x, y, z, nx, ny, nz
+    return x, y, z
 
 
 @jit
@@ -78,7 +75,9 @@ def _ring_is_met(k, hi, base, node, ax, ay, az, bx, by, bz):
     side = asked_side(k, node, az, bz)
     further = surface_end(k, hi, node) > k + 1 and node[k + 1, S_MODE] == lay.TOUCHED
     if side == NO_SIDE:
-        return node[k, S_MODE] == lay.TOUCHED or further or not _hint_is_behind(k, node, ax, ay, az, bx, by, bz)
+        return (
+            node[k, S_MODE] == lay.TOUCHED or further or not _hint_is_behind(k, node, ax, ay, az, bx, by, bz)
+        )
     if node[k, S_MODE] != lay.TOUCHED and not further:
         winding = segment_winding_angle(k, node, ax, ay, az, bx, by, bz)
     elif node[k, S_MODE] == lay.TOUCHED and further:
@@ -93,22 +92,16 @@ def _ring_is_met(k, hi, base, node, ax, ay, az, bx, by, bz):
 
 
 @jit
-def _axis_is_met(k, ends, node, ax, ay, az, bx, by, bz):
+def _axis_is_met(k, node, ax, ay, az, bx, by, bz):
     """Return whether the string from A to B, in S, passes the axis of row k's surface on the side of its hint.
 
-    The surface's normal turns to that side, in the middle of the contact or where a free string is nearest. A string
-    that winds a whole turn passes on every side.
+    A string that winds a whole turn passes on every side.
     """
+    winding = node[k, lay.S_SWEEP]
     if node[k, S_MODE] == lay.TOUCHED:
-        # a tangent covers less than a quarter turn about the axis
-        if abs(winding_angle(k, node)) >= 2.0 * math.pi:
-            return True
-        _, _, _, nx, ny, _ = _middle(k, ends, node)
-    else:
-        _, share = segment_clearance(node, k, ax, ay, az, bx, by, bz)
-        dx, dy, dz = bx - ax, by - ay, bz - az
-        _, _, _, nx, ny, _ = project(node, k, ax + share * dx, ay + share * dy, az + share * dz)
-    return nx * node[k, HINT + 1] + ny * node[k, HINT + 2] >= -LEVEL * node[k, SIZE]
+        winding = winding_angle(k, node)
+    asked = sweep_asked_for(k, node, ax, ay, az, bx, by, bz)
+    return abs(winding) >= 2.0 * math.pi or abs(winding - asked) < math.pi
 
 
 @jit
@@ -130,9 +123,10 @@ def _bounded_is_met(k, ends, node, ax, ay, az, bx, by, bz):
     dx, dy, dz = bx - ax, by - ay, bz - az
     square = max(dx * dx + dy * dy + dz * dz, 1e-300)
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
-    mx, my, mz, _, _, _ = _middle(k, ends, node)
+    mx, my, mz = _middle(k, ends, node)
     mx, my, mz = mx - fx, my - fy, mz - fz
-    hx, hy, hz = node[k, HINT + 1] - fx, node[k, HINT + 2] - fy, node[k, HINT + 3] - fz
+    hx, hy, hz = hint_outside(k, node)
+    hx, hy, hz = hx - fx, hy - fy, hz - fz
     across = mx * hx + my * hy + mz * hz
     across -= (mx * dx + my * dy + mz * dz) * (hx * dx + hy * dy + hz * dz) / square
     return across >= -LEVEL * node[k, SIZE] * node[k, SIZE]
@@ -148,7 +142,7 @@ def _is_met(k, lo, hi, ends, node):
     if not branched(k, node):
         return _bounded_is_met(k, ends, node, ax, ay, az, bx, by, bz)
     if closed_form(k, node):
-        return _axis_is_met(k, ends, node, ax, ay, az, bx, by, bz)
+        return _axis_is_met(k, node, ax, ay, az, bx, by, bz)
     return _ring_is_met(k, hi, ends[:3], node, ax, ay, az, bx, by, bz)
 
 

@@ -54,12 +54,10 @@ def _cross_each_other(ax, ay, px, py, bx, by, qx, qy):
 
 
 @jit
-def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
-    """Return the swept angle for a path that passes a cylinder on the hint's side, at a cold start.
+def asked_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
+    """Return the swept angle for which a hint asks: `principal`, that of the shorter way, or that of the other way.
 
-    Where the straight string does not enter the cylinder and its point nearest to the axis lies on that side, it stays
-    straight. Otherwise the way round whose middle is nearer to the hint is taken, also if it is the longer one, unless
-    it crosses itself. MuJoCo has the same rule for side sites (`mju_wrap` in engine_util_misc.c).
+    As `_hinted_sweep`, but whether or not the other way crosses itself.
     """
     size = math.sqrt(hint_x * hint_x + hint_y * hint_y)
     if size < 1e-9 * radius:
@@ -72,17 +70,29 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
         return principal
     turn = 1.0 if principal >= 0.0 else -1.0
     # the middle of the arc, as an angle about the axis: the shorter way round, then the other one
-    start, end = math.atan2(ay, ax), math.atan2(by, bx)
+    start = math.atan2(ay, ax)
     middle = start + 0.5 * (principal + turn * (alpha_a - alpha_b))
     towards = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     other = principal - turn * TWO_PI
     middle = start + 0.5 * (other - turn * (alpha_a - alpha_b))
     away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
-    if towards >= away:
+    return principal if towards >= away else other
+
+
+@jit
+def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
+    """Return the swept angle for a path that passes a cylinder on the hint's side, at a cold start.
+
+    Where the straight string does not enter the cylinder and its point nearest to the axis lies on that side, it stays
+    straight. Otherwise the way round whose middle is nearer to the hint is taken, also if it is the longer one, unless
+    it crosses itself. MuJoCo has the same rule for side sites (`mju_wrap` in engine_util_misc.c).
+    """
+    other = asked_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius)
+    if other == principal:
         return principal
     # contact points of the other way, which is not taken if its straight segments cross
-    start -= turn * alpha_a
-    end += turn * alpha_b
+    turn = 1.0 if principal >= 0.0 else -1.0
+    start, end = math.atan2(ay, ax) - turn * alpha_a, math.atan2(by, bx) + turn * alpha_b
     px, py = radius * math.cos(start), radius * math.sin(start)
     qx, qy = radius * math.cos(end), radius * math.sin(end)
     return principal if _cross_each_other(ax, ay, px, py, bx, by, qx, qy) else other

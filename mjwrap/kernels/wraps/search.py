@@ -16,7 +16,13 @@ from numba.core import types
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
-from mjwrap.kernels.geometry.dispatch import project, segment_clearance, segment_winding_angle, winding_angle
+from mjwrap.kernels.geometry.dispatch import (
+    height,
+    project,
+    segment_clearance,
+    segment_winding_angle,
+    winding_angle,
+)
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided
@@ -153,6 +159,15 @@ def wrap_by_search(k, ends, node, search):
 
 
 @jit
+def hint_outside(k, node):
+    """Return row k's hint, or the surface point nearest to it where it lies inside the surface."""
+    x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
+    if height(node, k, x, y, z) < 0.0:
+        x, y, z, _, _, _ = project(node, k, x, y, z)
+    return x, y, z
+
+
+@jit
 def hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
     """Return whether the hint lies behind row k's surface, seen from the lowest point F of the segment A + share d.
 
@@ -197,7 +212,8 @@ def _search(
     ux, uy, uz = dx / size, dy / size, dz / size
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
     if hinted:
-        wx, wy, wz = node[k, HINT + 1] - fx, node[k, HINT + 2] - fy, node[k, HINT + 3] - fz
+        wx, wy, wz = hint_outside(k, node)
+        wx, wy, wz = wx - fx, wy - fy, wz - fz
     else:
         _, _, _, wx, wy, wz = project(node, k, fx, fy, fz)
     along = wx * ux + wy * uy + wz * uz

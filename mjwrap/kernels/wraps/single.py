@@ -24,6 +24,7 @@ from mjwrap.kernels.wraps.ruled import (
     INSIDE,
     LEAST_BEND,
     SLIPPED,
+    asked_sweep,
     set_free,
     wrap_cone,
     wrap_cylinder,
@@ -139,3 +140,27 @@ def contains(k, node, x, y, z):
     """Return whether the point (x, y, z) of the world lies inside obstacle k."""
     x, y, z = into_frame(node, k, x, y, z)
     return height(node, k, x, y, z) < (INSIDE - 1.0) * node[k, SIZE]
+
+
+@jit
+def sweep_asked_for(k, node, ax, ay, az, bx, by, bz):
+    """Return the swept angle for which the hint of row k, which has an axis, asks for a string from A to B in S [rad].
+
+    It differs from the angle that the string sweeps by whole turns.
+    """
+    a, b, radius, radius_a, radius_b = 1.0, 1.0, node[k, DIM], node[k, DIM], node[k, DIM]
+    kind = node[k, KIND]
+    if kind == lay.ELLIPTIC_CYLINDER:
+        a, b, radius, radius_a, radius_b = node[k, DIM], node[k, DIM + 1], 1.0, 1.0, 1.0
+    elif kind == lay.CONE:
+        slope = node[k, DIM + 1]
+        radius_a, radius_b = node[k, DIM] + slope * az, node[k, DIM] + slope * bz
+        radius = max(radius_a, radius_b)
+    px, py, qx, qy = ax / a, ay / b, bx / a, by / b
+    root_a = math.sqrt(max(px * px + py * py - radius_a * radius_a, 0.0))
+    root_b = math.sqrt(max(qx * qx + qy * qy - radius_b * radius_b, 0.0))
+    principal = math.atan2(px * qy - py * qx, px * qx + py * qy)
+    return asked_sweep(
+        px, py, qx, qy, principal, math.atan2(root_a, radius_a), math.atan2(root_b, radius_b),
+        node[k, HINT + 1] / a, node[k, HINT + 2] / b, radius,
+    )  # fmt: skip
