@@ -23,7 +23,7 @@ from mjwrap.kernels.spans.cold_start import next_contact_point
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.tangency.tangency_error import evaluate
-from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side
+from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, hint_is_level, is_on_side
 from mjwrap.kernels.wraps.search import hint_is_behind, hint_outside
 from mjwrap.kernels.wraps.single import sweep_asked_for, wrap
 
@@ -74,7 +74,7 @@ def _ring_is_met(k, hi, base, node, ax, ay, az, bx, by, bz):
     """Return whether the string from A to B, in S, passes row k, a ring, on the side for which its hint asks."""
     side = asked_side(k, node, az, bz)
     further = surface_end(k, hi, node) > k + 1 and node[k + 1, S_MODE] == lay.TOUCHED
-    if side == NO_SIDE:
+    if side == NO_SIDE or (hint_is_level(k, node) and node[k, S_MODE] == lay.TOUCHED):
         return (
             node[k, S_MODE] == lay.TOUCHED or further or not _hint_is_behind(k, node, ax, ay, az, bx, by, bz)
         )
@@ -208,7 +208,7 @@ def meet_hints(lo, hi, ends, node, tol, length, error):
     """
     iterations, evaluations = 0, 0
     unmet = _mark_span(lo, hi, ends, node)
-    least, last = unmet, length
+    least, last, result, is_best = unmet, length, lay.CONVERGED, True
     save_solutions(lo, hi, node, W_BEST)
     for attempt in range(ATTEMPTS):
         if unmet == 0:
@@ -219,13 +219,16 @@ def meet_hints(lo, hi, ends, node, tol, length, error):
         evaluations += e
         before = unmet
         unmet = _mark_span(lo, hi, ends, node)
-        if attempt > 0 and unmet == before and abs(total - last) <= SAME * total:
-            break
+        same = attempt > 0 and unmet == before and abs(total - last) <= SAME * total
         last = total
-        if status == lay.CONVERGED and unmet < least:
-            least, length, error = unmet, total, square
+        # a path that meets all hints counts also where it leaves the range of a surface
+        is_best = unmet < least and (status == lay.CONVERGED or (status == lay.OUT_OF_RANGE and unmet == 0))
+        if is_best:
+            least, length, error, result = unmet, total, square, status
             save_solutions(lo, hi, node, W_BEST)
-    if unmet > 0:
+        if same:
+            break
+    if not is_best:
         restore_solutions(lo, hi, ends, node, W_BEST)
         evaluate(lo, hi, ends, node)
-    return lay.CONVERGED, length, error, iterations, evaluations
+    return result, length, error, iterations, evaluations

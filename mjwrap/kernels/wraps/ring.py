@@ -21,10 +21,11 @@ from mjwrap.kernels.wraps.initial_guess import place_contact
 DIM, HINT = lay.DIM, lay.HINT
 
 NO_SIDE = 0  # both ends are on one side of the ring's plane
-THROUGH = 1
+THROUGH = 1  # the string passes the disk in the hole
 OUTSIDE = 2
 PLANES = 9  # in which a string is led round the tube
 TURN = math.pi / 8  # between them
+LEVEL = 0.1  # a hint is right above or below the middle of the tube if the cosine of its angle is less
 HOLE_POINTS = 4  # places in the hole through which a string is led that touches the ring twice
 
 
@@ -34,6 +35,13 @@ def asked_side(k, node, az, bz):
     if not az * bz < 0.0:
         return NO_SIDE
     return THROUGH if math.hypot(node[k, HINT + 1], node[k, HINT + 2]) < node[k, DIM] else OUTSIDE
+
+
+@jit
+def hint_is_level(k, node):
+    """Return whether row k's hint is right above or below the middle of the tube, where it asks for no side."""
+    angle = tube_angle(node[k, DIM], node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3])
+    return abs(math.cos(angle)) < LEVEL
 
 
 @jit
@@ -49,18 +57,26 @@ def is_on_side(k, node, side, winding, ax, ay, az, bx, by, bz):
 
 
 @jit
-def wrap_on_side(k, ends, node, side, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
+def wrap_on_side(k, ends, node, side, done, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
     """Wrap the string from A to B over row k, a ring, on the given side; return whether such a path was found.
 
-    (fx, fy): the lowest point of AB. Newton's method starts from the hint first, then from circles round the tube in
+    done: the straight segment from A to B passes on that side already; then only a hint right above or below the
+    middle of the tube is followed. (fx, fy): the lowest point of AB.
+
+    Newton's method starts from the hint first, then from circles round the tube in
     planes through the ring's axis: the first is next to AB, the others turn away from it to both sides, and the last
     is next to the hint.
     """
+    level = hint_is_level(k, node)
+    if done and not level:
+        return False
     hx, hy, hz = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
     place_contact(k, node, hx, hy, hz, bx - ax, by - ay, bz - az, 0.0)
     good, _ = polish_from_low_ends(k, ends, node, high_a, high_b)
-    if good and is_on_side(k, node, side, winding_about_tube(k, node), ax, ay, az, bx, by, bz):
+    if good and (level or is_on_side(k, node, side, winding_about_tube(k, node), ax, ay, az, bx, by, bz)):
         return True
+    if done:
+        return False
     major, minor = node[k, DIM], node[k, DIM + 1]
     first, last = math.atan2(fy, fx), math.atan2(hy, hx)
     up = 1.0 if bz > az else -1.0

@@ -119,9 +119,10 @@ def wrap_by_search(k, ends, node, search):
     hinted = mode == COLD and node[k, HINT] > 0.0
     clear = low >= -CLEAR_DEPTH * node[k, SIZE]
     side = asked_side(k, node, az, bz) if hinted and winds else NO_SIDE
-    if side != NO_SIDE and not (clear and is_on_side(k, node, side, straight, ax, ay, az, bx, by, bz)):
+    if side != NO_SIDE:
+        done = clear and is_on_side(k, node, side, straight, ax, ay, az, bx, by, bz)
         fx, fy = ax + share * dx, ay + share * dy
-        if wrap_on_side(k, ends, node, side, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
+        if wrap_on_side(k, ends, node, side, done, ax, ay, az, bx, by, bz, fx, fy, high_a, high_b):
             node[k, S_SWEEP] = winding_angle(k, node)
             return inside
     if clear and not hooked:
