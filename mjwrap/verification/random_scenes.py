@@ -160,11 +160,15 @@ def _quaternion(R: Array) -> tuple[float, ...]:
 
 
 class Maker:
-    """Scenes of one class from one seed: geodesics from a pool are combined to scenes."""
+    """Scenes of one class from one seed: geodesics from a pool are combined to scenes.
+
+    name: of one of `CLASSES`, or the letters of a row.
+    """
 
     def __init__(self, name: str, seed: int, chunk: int) -> None:
-        self.kinds = CLASSES[name]
-        self.rng = np.random.default_rng([seed, list(CLASSES).index(name), chunk])
+        self.kinds = CLASSES.get(name, name)
+        place = list(CLASSES).index(name) if name in CLASSES else int.from_bytes(name.encode(), "big")
+        self.rng = np.random.default_rng([seed, place, chunk])
         letters = sorted({letter for k in self.kinds for letter in WILD.get(k, k)})
         turn = MOST_TURN if len(self.kinds) == 1 else ROW_TURN
         self.pool = {letter: draw_geodesics(self.rng, letter, POOL, turn) for letter in letters}
