@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 from mjwrap.verification.certificate import Case, findings
 from mjwrap.verification.random_scenes import Maker
 from mjwrap.verification.ring_sides import lone_ring, passes_as_hinted, spread
@@ -60,16 +61,19 @@ def test_a_cold_start_in_a_row_of_rings_is_the_warm_path_of_a_sweep() -> None:
 
 def test_a_string_through_a_flat_ring_touches_it_twice() -> None:
     """It dives through the hole under the near part of the tube and over the far one."""
-    ends = (-0.0694, -0.1296, -0.0171), (0.0853, 0.0379, 0.0383)
-    path = mw.solve_path(*ends, [mw.Obstacle(mw.Torus(0.03753, 0.012726), hint=(0.025, 0.007, 0.005))])
+    a, b = np.array([-0.0694, -0.1296, -0.0171]), np.array([0.0853, 0.0379, 0.0383])
+    path = mw.solve_path(a, b, [mw.Obstacle(mw.Torus(0.03753, 0.012726), hint=(0.025, 0.007, 0.005))])
     assert path.converged
     (contact,) = path.contacts
     assert len(contact.touches) == 2
     assert contact.touches[0] == replace(contact, touches=())
     assert contact.second is contact.touches[1]
-    assert contact.touches[0].P[2] < 0.0 < contact.touches[1].Q[2]
+    before, behind = contact.touches[0].P, contact.touches[1].Q
+    assert before is not None
+    assert behind is not None
+    assert before[2] < 0.0 < behind[2]
     row = [mw.Obstacle(mw.Torus(0.03753, 0.012726))]
-    assert findings([Case.of(*(np.array(end) for end in ends), row, path)]) == [""]
+    assert findings([Case.of(a, b, row, path)]) == [""]
 
 
 def test_touches_of_points_and_free_surfaces() -> None:
@@ -103,14 +107,13 @@ def test_touches_of_points_and_free_surfaces() -> None:
         (mw.EllipticCylinder((0.1, 0.09)), (0.0, -0.1, 0.0), True),
     ],
 )
-def test_a_path_says_whether_it_meets_the_hint(
-    surface: mw.Surface, hint: tuple[float, ...], met: bool
-) -> None:
+def test_a_path_says_whether_it_meets_the_hint(surface: Surface, hint: tuple[float, ...], met: bool) -> None:
     path = mw.solve_path((-0.3, 0.05, 0.0), (0.3, 0.05, 0.0), [mw.Obstacle(surface, hint=hint)])
     assert path.converged
     assert path.hints_met == [met]
-    (contact,) = path.contacts
-    assert np.sign(contact.P[1]) == (np.sign(hint[1]) if met else -np.sign(hint[1]))
+    point = path.contacts[0].P
+    assert point is not None
+    assert np.sign(point[1]) == (np.sign(hint[1]) if met else -np.sign(hint[1]))
 
 
 def test_hints_are_met_where_a_warm_string_is_on_another_side_only_if_it_is_not() -> None:

@@ -42,8 +42,11 @@ def pieces(sol: mw.PathSolution) -> list[Array]:
         if not contact.active:
             places.append(None)
             continue
-        first = _nearest(points, contact.touches[0].P, at)
-        at = _nearest(points, contact.touches[-1].Q, first)
+        before, behind = contact.touches[0].P, contact.touches[-1].Q
+        assert before is not None
+        assert behind is not None
+        first = _nearest(points, before, at)
+        at = _nearest(points, behind, first)
         places.append((first, at))
     found = []
     for k in range(len(places)):
