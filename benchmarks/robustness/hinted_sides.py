@@ -3,8 +3,8 @@
 Rings alone: ends on both sides, so that the straight line passes outside; the hint is anywhere on the inner side of the
 tube. Rows: scenes that are made along a known path (`mjwrap/verification/random_scenes.py`), with the middle of each
 geodesic as hint, and again with the hint of each ring anywhere on the side of the tube that the known path passes.
-Which side a path takes is judged from its polyline (`mjwrap/verification/ring_sides.py`). The exit status is 1 if a path
-is refuted.
+Which side a path takes is judged from its polyline (`mjwrap/verification/ring_sides.py`). The exit status is 1 if a
+path is refuted.
 """
 
 from __future__ import annotations

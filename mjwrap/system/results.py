@@ -124,8 +124,9 @@ class Results:
             if not len(drawn) or not state.node[lo:hi, layout.HINT].any():
                 continue
             node, (first, last) = state.node[lo:hi].copy(), (drawn[0], drawn[-1])
-            ends = (*first[segments.G_A : segments.G_A + 3], *last[segments.G_B : segments.G_B + 3])
-            hinted_sides.mark_unmet_hints(0, hi - lo, *(float(x) for x in ends), node)
+            ox, oy, oz = first[segments.G_A : segments.G_A + 3].tolist()
+            ix, iy, iz = last[segments.G_B : segments.G_B + 3].tolist()
+            hinted_sides.mark_unmet_hints(0, hi - lo, ox, oy, oz, ix, iy, iz, node)
             geoms = plan.links[lo:hi, muscle_paths.L_GEOM][node[:, layout.W_UNMET] > 0.0]
             found += [name_of(self.model, _GEOM, int(geom)) for geom in geoms]
         return found

@@ -16,6 +16,7 @@ import mjwrap as mw
 from mjwrap.verification.scenes import local
 
 Array = NDArray[np.float64]
+LEVEL = 0.1  # cosine of the angle about the tube within which a hint is right above or below it, and asks for no side
 FINE = 4e-4  # spacing of the points in which a path is judged [m]
 
 
@@ -62,8 +63,10 @@ def passes_as_hinted(sol: mw.PathSolution, row: list[mw.Obstacle]) -> bool:
         if not isinstance(obstacle.surface, mw.Torus) or obstacle.hint is None:
             continue
         points, major = local(obstacle, piece), obstacle.surface.major_radius
-        if points[0, 2] * points[-1, 2] < 0.0:
-            through = math.hypot(obstacle.hint[0], obstacle.hint[1]) < major
+        aside = math.hypot(obstacle.hint[0], obstacle.hint[1]) - major
+        level = abs(aside) < LEVEL * math.hypot(aside, obstacle.hint[2])
+        if points[0, 2] * points[-1, 2] < 0.0 and not level:
+            through = aside < 0.0
             if crossings(points, major) != (math.copysign(1, points[0, 2]) if through else 0):
                 return False
     return True
