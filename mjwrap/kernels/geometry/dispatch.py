@@ -21,6 +21,7 @@ from mjwrap.kernels.geometry.clearance import (
     part_between,
 )
 from mjwrap.kernels.geometry.closed_forms import capsule, cone, cylinder, sphere
+from mjwrap.kernels.geometry.elliptic_cylinder import elliptic_cylinder
 from mjwrap.kernels.geometry.projection import (
     height_over_capsule,
     height_over_cone,
@@ -80,8 +81,10 @@ def evaluate_geodesic(k, node):
         cylinder(k, node)
     elif kind == lay.SPHERE:
         sphere(k, node)
-    elif kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
+    elif kind == lay.ELLIPSOID:
         quadric(k, node)
+    elif kind == lay.ELLIPTIC_CYLINDER:
+        elliptic_cylinder(k, node)
     elif kind == lay.TORUS:
         torus(k, node)
     elif kind == lay.CONE:

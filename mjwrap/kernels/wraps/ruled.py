@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
+from mjwrap.kernels.geometry.elliptic_cylinder import ellipse_arc
 from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
 
 DIM, HINT = lay.DIM, lay.HINT
@@ -27,9 +26,6 @@ LEAST_BEND = 1e-12  # a wrap with a smaller arc angle counts as not touching [ra
 A_INSIDE = 1
 B_INSIDE = 2
 SLIPPED = 4  # the string winds about a cone and would slip over its apex
-
-# quadrature of an ellipse's arc, for each radian or less
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @jit
@@ -149,23 +145,8 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
 
 
 @jit
-def _ellipse_arc(a, b, start, arc):
-    """Return the length of the ellipse (a cos w, b sin w) from w = start over the signed angle arc, by Gauss' rule."""
-    pieces = int(math.ceil(abs(arc)))
-    half = 0.5 * arc / max(pieces, 1)
-    total = 0.0
-    for j in range(pieces):
-        middle = start + (2 * j + 1) * half
-        for i in range(_NODES.shape[0]):
-            w = middle + half * _NODES[i]
-            x, y = a * math.sin(w), b * math.cos(w)
-            total += _WEIGHTS[i] * math.sqrt(x * x + y * y)
-    return abs(half) * total
-
-
-@jit
 def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
-    """Wrap a string from A to B over an elliptic cylinder about z; relative error of the arc length about 1e-10."""
+    """Wrap a string from A to B over an elliptic cylinder about z."""
     a, b = node[k, DIM], node[k, DIM + 1]
     # in the affine image in which the cross-section is the unit circle, tangents are tangents
     px, py, qx, qy = ax / a, ay / b, bx / a, by / b
@@ -188,7 +169,7 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     nx, ny = _contact_normal(px, py, 1.0, root_a, turn)
     mx, my = _contact_normal(qx, qy, 1.0, root_b, -turn)
     out = math.hypot(a * nx - ax, b * ny - ay)
-    round_it = _ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
+    round_it = ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
     # lengths seen along the axis are not those of the affine image
     flat = out + round_it + math.hypot(a * mx - bx, b * my - by)
     slope = (bz - az) / flat
