@@ -16,6 +16,10 @@ from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
 W_KP, W_KQ = lay.W_KP, lay.W_KQ
 
+# a contact that slides over a capsule's seam stops this share of the radius behind it
+BEHIND_SEAM = 1e-9
+LEAST_SLOPE = 0.05  # along a direction that rises less, the curvature jumps little
+
 
 @jit
 def cylinder(k, node):
@@ -196,6 +200,39 @@ def capsule_normal(radius, half, x, y, z):
         return 1.0, 0.0, 0.0
     inverse = 1.0 / size
     return x * inverse, y * inverse, z * inverse
+
+
+@jit
+def cut_at_seam(radius, half, z, along, aside, slide, share):
+    """Return the slide of a point of a capsule at height z, cut where a share of it would lead over a seam [m].
+
+    along: rise along the axis per slide; aside: rise by another part of the same step [m]. The point stops just behind
+    the first seam on its way.
+    """
+    rise = share * (slide * along + aside)
+    if abs(along) < LEAST_SLOPE or rise == 0.0:
+        return slide
+    way = 1.0 if rise > 0.0 else -1.0
+    seam = -half if way * z < -half else half
+    gap = seam - way * z
+    if gap < 0.0 or gap >= way * rise:
+        return slide
+    cut = (way * (gap + BEHIND_SEAM * radius) / share - aside) / along
+    # not backwards, where another part of the step leads over the seam
+    return cut if cut * slide > 0.0 else 0.0
+
+
+@jit
+def way_over_shaft(radius, half, z, along, bend, deviation):
+    """Return the signed way along a helix on a capsule's shaft to just behind a seam [m], as `way_to_seam`."""
+    if abs(z) > half or abs(along) < LEAST_SLOPE or deviation == 0.0:
+        return 0.0
+    way = math.copysign(1.0, deviation)
+    rise = way * along
+    left = (half - z) / rise if rise > 0.0 else (-half - z) / rise
+    if left * bend >= abs(deviation):
+        return 0.0
+    return way * (left + BEHIND_SEAM * radius)
 
 
 @jit

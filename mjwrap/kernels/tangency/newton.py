@@ -16,6 +16,7 @@ from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.tangency.block_elimination import solve_newton_system
 from mjwrap.kernels.tangency.path_error import dot_columns
+from mjwrap.kernels.tangency.seams import any_seams, move_to_seams, stop_at_seams
 from mjwrap.kernels.tangency.tangency_error import connect_segments, ends_on_surface, evaluate
 
 S_MODE, S_P, S_ARC, SIZE = lay.S_MODE, lay.S_P, lay.S_ARC, lay.SIZE
@@ -74,13 +75,20 @@ def step(lo, hi, ends, node, square):
     Returns (whether ||f|| went down, ||f||^2, iterations, evaluations); iterations is 0 where the Newton system is
     singular, else 1. Where no share of the step reduces ||f||, ||f||^2 is the old one and the rows hold the last trial.
     """
+    seamed = any_seams(lo, hi, node)
+    moves = 0
+    if seamed and move_to_seams(lo, hi, ends, node):
+        square = evaluate(lo, hi, ends, node)
+        moves = 1
     if not solve_newton_system(lo, hi, node):
-        return False, square, 0, 0
+        return False, square, 0, moves
     share = _step_limit(lo, hi, node)
     if not math.isfinite(share) or share <= 0.0:
-        return False, square, 1, 0
+        return False, square, 1, moves
+    if seamed:
+        stop_at_seams(lo, hi, share, ends, node)
     _save(lo, hi, node)
-    evaluations = 0
+    evaluations = moves
     trial = square
     for _ in range(MAX_HALVINGS):
         _move(lo, hi, share, node)
