@@ -165,7 +165,8 @@ def _start_at_end_on_surface(lo, hi, ends, node):
         if node[k, S_MODE] != TOUCHED:
             continue
         normal = dot_columns(node, k, W_E, k, W_NP)
-        if node[k, W_L] <= AT_END * node[k, SIZE] or not ends_on_surface(k, -normal, node[k, W_L], node):
+        size, bend = node[k, W_L], node[k, lay.W_KP]
+        if size <= AT_END * node[k, SIZE] or not ends_on_surface(k, -normal, size, bend, node):
             return False
         x, y, z = into_frame(node, k, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5])
         x, y, z, _, _, _ = project(node, k, x, y, z)

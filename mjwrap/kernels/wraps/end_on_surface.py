@@ -104,7 +104,8 @@ def polish_shot(k, ends, node, side, high_a, high_b, angle, arc):
         for i in range(3):
             node[k, S_T + i] = -node[k, S_T + i]
         node[k, S_ARC] = arc
-    return _polish_on_surface(k, ends, node, side == FROM_A, side == TO_B, high_a, high_b)
+    # the other end may be low, too
+    return polish_from_low_ends(k, ends, node, high_a, high_b)
 
 
 @jit

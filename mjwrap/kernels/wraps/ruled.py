@@ -16,12 +16,15 @@ from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
 from mjwrap.kernels.geometry.elliptic_cylinder import ellipse_arc
 from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
+from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
 DIM, HINT = lay.DIM, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
 
 INSIDE = 1.0 - 1e-9  # a point is inside if its distance from the axis is less than this share of the radius
 LEAST_BEND = 1e-12  # a wrap with a smaller arc angle counts as not touching [rad]
+
+LEAST_TANGENT = ON_SURFACE  # an end whose straight tangent is shorter than this share of the radius is on the surface
 
 A_INSIDE = 1
 B_INSIDE = 2
@@ -98,6 +101,27 @@ def _sweep(k, node, ax, ay, bx, by):
 
 
 @jit
+def tangent_length(square, least):
+    """Return the length of the straight tangent to a circle, from its square; 0 below `least`.
+
+    Where the path ends on the surface there is no straight segment (`tangency_error.ends_on_surface`).
+    """
+    return math.sqrt(square) if square > least * least else 0.0
+
+
+@jit
+def _tangent_to_ellipse(px, py, square, a, b):
+    """Return `tangent_length` in the affine image in which the ellipse is a unit circle, from the point (px, py).
+
+    square: of the point's distance from the centre there.
+    """
+    root = math.sqrt(max(square - 1.0, 0.0))
+    if root <= LEAST_TANGENT and root * math.hypot(a * py, b * px) <= LEAST_TANGENT * min(a, b):
+        return 0.0
+    return root
+
+
+@jit
 def _contact_normal(ax, ay, radius, root, turn):
     """Return the unit vector at A's polar angle, turned by the angle whose cosine is radius / rho."""
     square = ax * ax + ay * ay
@@ -114,8 +138,8 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     square_a, square_b, square = ax * ax + ay * ay, bx * bx + by * by, radius * radius
     limit = INSIDE * INSIDE * square
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
-    root_a = math.sqrt(max(square_a - square, 0.0))
-    root_b = math.sqrt(max(square_b - square, 0.0))
+    least = LEAST_TANGENT * radius
+    root_a, root_b = tangent_length(square_a - square, least), tangent_length(square_b - square, least)
     sweep = _sweep(k, node, ax, ay, bx, by)
     if _hinted(k, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
@@ -153,8 +177,8 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     square_a, square_b = px * px + py * py, qx * qx + qy * qy
     limit = INSIDE * INSIDE
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
-    root_a = math.sqrt(max(square_a - 1.0, 0.0))
-    root_b = math.sqrt(max(square_b - 1.0, 0.0))
+    root_a = _tangent_to_ellipse(px, py, square_a, a, b)
+    root_b = _tangent_to_ellipse(qx, qy, square_b, a, b)
     sweep = _sweep(k, node, px, py, qx, qy)
     if _hinted(k, node):
         hint_x, hint_y = node[k, HINT + 1] / a, node[k, HINT + 2] / b
@@ -194,7 +218,7 @@ def _tangent_ruling(rho, radius):
     # inside the cone, or inside its mirror image beyond the apex, there is no tangent plane
     if rho <= abs(radius):
         return (0.0 if radius > 0.0 else math.pi), 0.0
-    root = math.sqrt((rho - radius) * (rho + radius))
+    root = tangent_length((rho - radius) * (rho + radius), LEAST_TANGENT * abs(radius))
     return math.atan2(root, radius), root
 
 
