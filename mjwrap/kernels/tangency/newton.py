@@ -94,6 +94,9 @@ def step(lo, hi, ends, node, square):
         _move(lo, hi, share, node)
         trial = evaluate(lo, hi, ends, node)
         evaluations += 1
+        if not trial < square and _stop_at_end_on_surface(lo, hi, node):
+            trial = evaluate(lo, hi, ends, node)
+            evaluations += 1
         if trial < square:
             break
         share *= 0.5
@@ -174,5 +177,22 @@ def _start_at_end_on_surface(lo, hi, ends, node):
         node[k, S_P + 1] = y
         node[k, S_P + 2] = z
         displace(k, 0.0, 0.0, 0.0, 0.0, node)
+        return True
+    return False
+
+
+@jit
+def _stop_at_end_on_surface(lo, hi, node):
+    """If the path ends on the surface, near Q, let the geodesic end there; return whether it was changed.
+
+    Where the last straight segment vanishes, the distance from the end takes the place of its direction, and counts for
+    more: without this a step that reaches the end but for a little would be refused.
+    """
+    for k in range(hi - 1, lo - 1, -1):
+        if node[k, S_MODE] != TOUCHED:
+            continue
+        if node[k, lay.W_END_ON_SURFACE] == 0.0 or node[k, lay.W_END_TARGET] != 0.0:
+            return False
+        node[k, S_ARC] -= node[k, lay.W_CQ + 1]  # (Q - B)·t
         return True
     return False

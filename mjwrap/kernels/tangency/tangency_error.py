@@ -31,7 +31,7 @@ LEAST_HEIGHT = 2e-12  # an end point less high above the surface than this share
 END_DISTANCE_SCALE = 0.01
 CORNER = 1e-6  # two contacts that meet form a corner if half the angle between them is larger [rad]
 # rounding error of a point [m]; divided by a segment's length, that of its direction; times a curvature, of the normal
-POINT_ROUNDING = 4e-16
+POINT_ROUNDING = 2e-15
 
 
 @jit
