@@ -20,7 +20,7 @@ from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
-from mjwrap.kernels.spans.end_inside import substitute_path
+from mjwrap.kernels.spans.end_inside import lies_on_surfaces, substitute_path
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
 
@@ -208,7 +208,8 @@ def solve_span(lo, hi, ends, node, tol, direct):
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     replaces it by the new one; a path that is lost is searched for as at a cold start. With `direct` a lone obstacle is
     wrapped in closed form; of its saved solution only the branch is used. Where an end lies inside a surface, length,
-    error and saved solution are those of the substitute path (`end_inside.py`).
+    error and saved solution are those of the substitute path (`end_inside.py`), which is the path where the end is as
+    little inside as a rounded number may put it.
     """
     warm = not any_in_mode(lo, hi, node, COLD)
     if direct and warm and hi - lo == 1 and closed_form(lo, node):
@@ -233,4 +234,6 @@ def solve_span(lo, hi, ends, node, tol, direct):
         total, error, i, e = substitute_path(lo, hi, ends, node, tol, direct)
         iterations += i
         evaluations += e
+        if error <= tol and lies_on_surfaces(lo, hi, ends, node):
+            status = lay.CONVERGED
     return status, total, error, iterations, evaluations

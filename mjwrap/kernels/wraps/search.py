@@ -48,7 +48,7 @@ NEAR_HINT = 5  # half planes within 60 degrees of the hint
 THREAD_STARTS = 9  # planes in which a string is led through a ring
 THREAD_TURN = math.pi / 8  # between them
 DIRECTIONS = 12  # number of half planes around AB
-CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
+CLEAR_DEPTH = 1e-9  # a segment that goes less deep below a surface, in the surface's size, is clear of it
 SAME_BRANCH = 1.0  # winding angles that differ by less belong to the same branch [rad]
 
 
