@@ -13,7 +13,9 @@ from mjwrap.mjcf.couplings import CoupledJoints
 
 Array = NDArray[np.float64]
 POSES = 64
-DEEP = 1.0 - AS_WRITTEN  # an end is inside if its distance from centre or axis is less than this share of the radius
+DEEP = (
+    1.0 - AS_WRITTEN
+)  # an end is inside if its distance from centre or axis is less than this share of the radius
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)  # the type of hinges is larger
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 

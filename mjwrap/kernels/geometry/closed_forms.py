@@ -16,8 +16,9 @@ from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
 W_KP, W_KQ = lay.W_KP, lay.W_KQ
 
-# a contact that slides over a capsule's seam stops this share of the radius behind it
+# a contact that slides over a capsule's seam gets at least this share of the radius behind it
 BEHIND_SEAM = 1e-9
+MAX_BEHIND = 0.5  # largest slide behind a seam in one step, in radii
 LEAST_SLOPE = 0.05  # along a direction that rises less, the curvature jumps little
 
 
@@ -203,11 +204,13 @@ def capsule_normal(radius, half, x, y, z):
 
 
 @jit
-def cut_at_seam(radius, half, z, along, aside, slide, share):
-    """Return the slide of a point of a capsule at height z, cut where a share of it would lead over a seam [m].
+def slide_over_seam(radius, half, z, along, aside, slide, share, bend, slope):
+    """Return the slide of a point of a capsule at height z that does what the given one would without a seam [m].
 
-    along: rise along the axis per slide; aside: rise by another part of the same step [m]. The point stops just behind
-    the first seam on its way.
+    along: rise along the axis per slide; aside: rise by another part of the same step [m]; share: how much of the step
+    is taken; slope: rate at which the error to be removed changes with the slide, of which `bend` is the normal
+    curvature [1/m]. Behind the first seam on the way the curvature is another one, and the rest of the slide is as much
+    longer or shorter.
     """
     rise = share * (slide * along + aside)
     if abs(along) < LEAST_SLOPE or rise == 0.0:
@@ -217,9 +220,18 @@ def cut_at_seam(radius, half, z, along, aside, slide, share):
     gap = seam - way * z
     if gap < 0.0 or gap >= way * rise:
         return slide
-    cut = (way * (gap + BEHIND_SEAM * radius) / share - aside) / along
-    # not backwards, where another part of the step leads over the seam
-    return cut if cut * slide > 0.0 else 0.0
+    cut = (way * gap / share - aside) / along
+    if cut * slide <= 0.0:  # another part of the step leads over the seam
+        return slide
+    # from the cap onto the shaft, or the other way round
+    behind = 1.0 / radius
+    if abs(z) > half or (abs(z) == half and way * z < 0.0):
+        behind = (1.0 - along * along) / radius
+    behind += slope - bend
+    most = MAX_BEHIND * radius / share
+    rest = abs(slide - cut)
+    rest = min(rest * max(slope, 0.0) / behind, most) if behind * most > rest * max(slope, 0.0) else most
+    return cut + math.copysign(max(rest, BEHIND_SEAM * radius / share), slide)
 
 
 @jit

@@ -20,7 +20,14 @@ from mjwrap.kernels.geometry.clearance import (
     lowest_over_cone,
     part_between,
 )
-from mjwrap.kernels.geometry.closed_forms import capsule, cone, cut_at_seam, cylinder, sphere, way_over_shaft
+from mjwrap.kernels.geometry.closed_forms import (
+    capsule,
+    cone,
+    cylinder,
+    slide_over_seam,
+    sphere,
+    way_over_shaft,
+)
 from mjwrap.kernels.geometry.elliptic_cylinder import elliptic_cylinder
 from mjwrap.kernels.geometry.projection import (
     height_over_capsule,
@@ -260,10 +267,11 @@ def has_seams(k, node):
 
 
 @jit
-def slide_to_seam(k, node, ends, point, tangent, binormal, slide, shift, share):
-    """Return the slide of a contact along its tangent [m], cut where a share of it would lead over a seam of row k.
+def slide_past_seam(k, node, ends, point, tangent, binormal, slide, shift, share, bend, slope):
+    """Return the slide of a contact along its tangent [m], changed where a share of it leads over a seam of row k.
 
-    ends: as for `solve_span`; point, tangent, binormal: columns of the contact; shift: its move along its binormal.
+    ends: as for `solve_span`; point, tangent, binormal: columns of the contact; shift: its move along its binormal;
+    bend, slope: normal curvature, and rate of the error with the slide.
     """
     z, along = _along_axis(k, node, ends, point, tangent)
     aside = shift * (
@@ -271,7 +279,7 @@ def slide_to_seam(k, node, ends, point, tangent, binormal, slide, shift, share):
         + node[k, ROT + 5] * node[k, binormal + 1]
         + node[k, ROT + 8] * node[k, binormal + 2]
     )
-    return cut_at_seam(node[k, DIM], node[k, DIM + 1], z, along, aside, slide, share)
+    return slide_over_seam(node[k, DIM], node[k, DIM + 1], z, along, aside, slide, share, bend, slope)
 
 
 @jit

@@ -23,10 +23,14 @@ from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, 
 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
 
-SPREAD = 0.005  # the series of Carlson's integrals is exact to rounding if its arguments differ by a smaller share
+SPREAD = (
+    0.005  # the series of Carlson's integrals is exact to rounding if its arguments differ by a smaller share
+)
 MAX_DUPLICATIONS = 60  # twelve are normal at an aspect of 1e6
 MAX_INVERSIONS = 60  # most steps to the angle of an arc; two or three are normal
-SHORT_ARC = 0.8  # an arc over a smaller angle, times b/a, is integrated by Gauss' rule: a difference has no digits
+SHORT_ARC = (
+    0.8  # an arc over a smaller angle, times b/a, is integrated by Gauss' rule: a difference has no digits
+)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -52,7 +56,9 @@ def _arc_from_tip(a, b, c, s):
     dx, dy = 1.0 - x * over, 1.0 - y * over
     dz = -(dx + dy)
     e2, e3 = dx * dy - dz * dz, dx * dy * dz
-    first = (1.0 - e2 * (0.1 - e2 / 24.0 + e3 * (3.0 / 44.0) + e2 * e2 * (5.0 / 208.0)) + e3 / 14.0) / math.sqrt(mean)
+    first = (
+        1.0 - e2 * (0.1 - e2 / 24.0 + e3 * (3.0 / 44.0) + e2 * e2 * (5.0 / 208.0)) + e3 / 14.0
+    ) / math.sqrt(mean)
     # R_D by its series (DLMF 19.36.2), in which z counts three times
     mean = 0.2 * (x + y + 3.0 * z)
     over = 1.0 / mean
@@ -161,7 +167,9 @@ def elliptic_cylinder(k, node):
     c, s = side * math.cos(stop), side * math.sin(stop)
     rate = math.sqrt(a * a * s * s + b * b * c * c)
     over = 1.0 / rate
-    _put(node, k, swapped, True, a * c, b * s, z + node[k, S_ARC] * tz, b * c * over, a * s * over, around, tz)
+    _put(
+        node, k, swapped, True, a * c, b * s, z + node[k, S_ARC] * tz, b * c * over, a * s * over, around, tz
+    )
     bend = a * b / (rate * rate * rate)
     kappa = bend * around * around
     put_curvature(node, k, lay.W_KQ, kappa, bend * around * tz, bend * tz * tz)

@@ -38,7 +38,10 @@ def _height_over_contact(k, at_p, x, y, z, node):
 @jit
 def is_below_contact(k, at_p, x, y, z, node):
     """Return whether an end next to P or Q of row k, relative to the base, lies inside a surface that keeps it out."""
-    return node[k, lay.INSIDE] == 0.0 and _height_over_contact(k, at_p, x, y, z, node) < (INSIDE - 1.0) * node[k, lay.SIZE]
+    return (
+        node[k, lay.INSIDE] == 0.0
+        and _height_over_contact(k, at_p, x, y, z, node) < (INSIDE - 1.0) * node[k, lay.SIZE]
+    )
 
 
 @jit

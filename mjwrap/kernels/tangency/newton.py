@@ -16,7 +16,7 @@ from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.tangency.block_elimination import solve_newton_system
 from mjwrap.kernels.tangency.path_error import dot_columns
-from mjwrap.kernels.tangency.seams import any_seams, move_to_seams, stop_at_seams
+from mjwrap.kernels.tangency.seams import any_seams, move_to_seams, step_over_seams
 from mjwrap.kernels.tangency.tangency_error import (
     LEAST_HEIGHT,
     ON_SURFACE,
@@ -31,7 +31,9 @@ W_START_ERROR = lay.W_START_ERROR
 TOUCHED = lay.TOUCHED
 
 AT_END = 1e-11  # a contact nearer to an end on the surface than this share of the size has reached the end
-MAX_END_MOVE = 0.3  # an end that has moved less on the surface takes the contact with it, as a share of the size
+MAX_END_MOVE = (
+    0.3  # an end that has moved less on the surface takes the contact with it, as a share of the size
+)
 MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in the surface's size
 MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in the surface's size, beside half its arc
@@ -90,16 +92,18 @@ def step(lo, hi, ends, node, square):
     """
     seamed = any_seams(lo, hi, node)
     moves = 0
-    if seamed and move_to_seams(lo, hi, ends, node):
+    solved = solve_newton_system(lo, hi, node)
+    if seamed and move_to_seams(lo, hi, ends, node, MAX_SHIFT if solved else 0.0):
         square = evaluate(lo, hi, ends, node)
         moves = 1
-    if not solve_newton_system(lo, hi, node):
+        solved = solve_newton_system(lo, hi, node)
+    if not solved:
         return False, square, 0, moves
     share = _step_limit(lo, hi, node)
     if not math.isfinite(share) or share <= 0.0:
         return False, square, 1, moves
     if seamed:
-        stop_at_seams(lo, hi, share, ends, node)
+        step_over_seams(lo, hi, share, ends, node)
     _save(lo, hi, node)
     evaluations = moves
     trial = square

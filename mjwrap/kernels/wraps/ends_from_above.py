@@ -81,9 +81,7 @@ def search_from_above(k, ends, node, a, b, high_a, high_b, first):
         turn = (j + 1) // 2 * (2.0 * math.pi / DIRECTIONS)
         c, s = math.cos(turn), math.sin(turn) if j % 2 == 1 else -math.sin(turn)
         gx, gy, gz = c * wx + s * vx, c * wy + s * vy, c * wz + s * vz
-        if not guess_in_half_plane(
-            k, node, ax, ay, az, ux, uy, uz, gx, gy, gz, size, share * size, 0.0
-        ):
+        if not guess_in_half_plane(k, node, ax, ay, az, ux, uy, uz, gx, gy, gz, size, share * size, 0.0):
             continue
         good, _ = polish(k, above, node, NOT_EVALUATED)
         if not good:

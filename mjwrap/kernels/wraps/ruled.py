@@ -24,7 +24,9 @@ S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, la
 INSIDE = 1.0 - 1e-9  # a point is inside if its distance from the axis is less than this share of the radius
 LEAST_BEND = 1e-12  # a wrap with a smaller arc angle counts as not touching [rad]
 
-LEAST_TANGENT = ON_SURFACE  # an end whose straight tangent is shorter than this share of the radius is on the surface
+LEAST_TANGENT = (
+    ON_SURFACE  # an end whose straight tangent is shorter than this share of the radius is on the surface
+)
 
 A_INSIDE = 1
 B_INSIDE = 2
