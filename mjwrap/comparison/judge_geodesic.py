@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.kernels.layout import AS_WRITTEN
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int64]
@@ -98,8 +100,21 @@ def nearest(a: Array, b: Array, cylinder: bool) -> Array:
     return start + place[:, None] * step
 
 
+def lifted(a: Array, cylinder: bool, radius: float) -> Array:
+    """Return the points with those that lie a little inside moved onto the surface."""
+    radial = _radial(a, cylinder)
+    far = _norm(radial)
+    low = (far < radius) & (far >= (1.0 - AS_WRITTEN) * radius)
+    share = np.where(low, radius / np.where(low, far, 1.0) - 1.0, 0.0)
+    return a + share[:, None] * radial
+
+
 def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array) -> Judgement:
-    """Judge paths from a to b (T, 3) over one surface; p, q (T, 3) are used where `touched` (T,) is true."""
+    """Judge paths from a to b (T, 3) over one surface; p, q (T, 3) are used where `touched` (T,) is true.
+
+    An end as little inside as a number written with six digits may put it lies on the surface (`layout.AS_WRITTEN`).
+    """
+    a, b = lifted(a, cylinder, radius), lifted(b, cylinder, radius)
     with np.errstate(invalid="ignore", divide="ignore"):
         straight = _judge_straight(cylinder, radius, a, b)
         wrapped = _judge_wrapped(cylinder, radius, a, b, p, q)

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.judge_geodesic import ANGLE, INSIDE_TOLERANCE, Fault, judge, judge_held
+from mjwrap.comparison.judge_geodesic import ANGLE, INSIDE_TOLERANCE, Fault, judge, judge_held, lifted
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
 from mjwrap.poses.continuation import PathFollower, SweepTrace
 from mjwrap.poses.joint_sweeps import PoseSequence
@@ -196,6 +196,11 @@ class Comparer:
                 local = _in_frame(self.model, span.geom, geoms, at)
                 found = judge_held(*local, angle) if span.inside else judge(*local)
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
+                if not span.inside:  # what lies between a surface and an end just below it does not count
+                    cylinder, radius, a, b, _, p, q = local
+                    over = np.linalg.norm(p - lifted(a, cylinder, radius), axis=1)
+                    over += np.linalg.norm(lifted(b, cylinder, radius) - q, axis=1)
+                    straight = np.where(at.touched, over, straight)
                 if span.hint >= 0 and not span.inside:
                     side = geoms.local(span.geom, geoms.sites[:, span.hint])
                     hinted[:, s] = np.einsum("ti,ti->t", found.middle[:, :2], side[:, :2]) > 0.0

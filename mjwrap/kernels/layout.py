@@ -65,6 +65,10 @@ ELLIPSE_SECTIONS = 32  # an ellipsoid with semi-axes DIM, so that plane sections
 ABOUT_POINT = 1.0  # a sphere
 ABOUT_AXIS = 2.0  # a cylinder about z
 
+# An end that lies less deep inside a surface than this share of its size lies on it, as far as can be known from a file
+# with six digits: each coordinate of an end up to ten sizes away is rounded by 5e-5 sizes at most.
+AS_WRITTEN = 1e-4
+
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0
 NOT_CONVERGED = 1

@@ -8,10 +8,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.kernels.layout import AS_WRITTEN
 from mjwrap.mjcf.couplings import CoupledJoints
 
 Array = NDArray[np.float64]
 POSES = 64
+DEEP = (
+    1.0 - AS_WRITTEN
+)  # an end is inside if its distance from centre or axis is less than this share of the radius
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)  # the type of hinges is larger
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 
@@ -44,11 +48,14 @@ def _kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
 
 
 def end_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int) -> bool:
-    """Return whether a site lies inside a sphere geom, or a cylinder geom of any length, at the given poses."""
+    """Return whether a site lies inside a sphere geom, or a cylinder geom of any length, at the given poses.
+
+    A site that a number with six digits may have put there from the surface is not inside (`layout.AS_WRITTEN`).
+    """
     local = _local(poses, geom, site)
     if int(model.geom_type[geom]) == _CYLINDER:
         local = local[:2]
-    return bool(np.linalg.norm(local) < model.geom_size[geom, 0] < np.inf)
+    return bool(np.linalg.norm(local) < DEEP * model.geom_size[geom, 0] < np.inf)
 
 
 def side_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int) -> bool:
@@ -84,7 +91,7 @@ def shares_inside(model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
         offset = data.site_xpos[sites] - data.geom_xpos[geoms]
         along = np.einsum("ni,ni->n", offset, data.geom_xmat[geoms][:, 2::3])
         square = np.einsum("ni,ni->n", offset, offset) - np.where(level, along * along, 0.0)
-        inside += square < radius * radius
+        inside += square < (DEEP * radius) ** 2
     return inside / POSES
 
 

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from mjwrap.errors import StateError
+from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import finite_checks
 from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.mjcf import MuscleDeclaration, name_of
@@ -33,7 +34,8 @@ def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDecla
                 local = poses.geom_xmat[node.geom].reshape(3, 3).T @ (
                     poses.site_xpos[site] - poses.geom_xpos[node.geom]
                 )
-                if height(np.array(kernel_rows(node)), 0, *local.tolist()) < 0.0:
+                row = np.array(kernel_rows(node))
+                if height(row, 0, *local.tolist()) < -layout.AS_WRITTEN * row[0, layout.SIZE]:
                     inner = name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
                     outer = name_of(model, mujoco.mjtObj.mjOBJ_GEOM, node.geom)
                     found.append(f"site '{inner}' is inside geom '{outer}'")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.special import ellipeinc
 
 from mjwrap.surfaces import Surface
 from mjwrap.verification.shapes import (
@@ -21,12 +22,13 @@ from mjwrap.verification.shapes import (
     Capsule,
     Cone,
     Cylinder,
-    Ellipsoid,
+    EllipticCylinder,
     Ints,
     Shape,
     Sphere,
     dot,
     sizes,
+    unit,
 )
 
 STAGES = 8  # order 16
@@ -34,6 +36,7 @@ TURN = 1.0  # largest turn of the direction within one step [rad]
 ITERATIONS = 25  # fixed-point iterations within one step; the error decreases like TURN^k / k!
 HALVINGS = 3  # number of times that too long steps are halved
 DRIFT = 1e-12  # largest error of a tangent's length, and of the end's distance from the surface in radii of curvature
+INVERSIONS = 80  # Newton steps to the angle of an arc of an ellipse
 SAMPLES = 17  # number of points at which a closed form is evaluated
 
 
@@ -65,10 +68,16 @@ def arcs_of(shape: Shape, d: Array, P: Array, t: Array, s: Array) -> Arcs:
     """Return the geodesics of surfaces with sizes d (m, k) from P along the unit tangents t (m, 3) over s >= 0 (m)."""
     if isinstance(shape, Capsule):
         return _capsules(shape, d, P, t, s)
-    if isinstance(shape, Ellipsoid) or not isinstance(shape, Sphere | Cone):
+    if not isinstance(shape, Sphere | Cone | EllipticCylinder):
         return _collocated(shape, d, P, t, s)
     x = s[:, None] * np.linspace(0.0, 1.0, SAMPLES)
-    exact = _sphere if isinstance(shape, Sphere) else _cylinder if isinstance(shape, Cylinder) else _cone
+    exact = _cone
+    if isinstance(shape, Sphere):
+        exact = _sphere
+    elif isinstance(shape, Cylinder):
+        exact = _cylinder
+    elif isinstance(shape, EllipticCylinder):
+        exact = _elliptic
     points, tangents, a, r = exact(d[:, None], P[:, None], t[:, None], x)
     return _listed(shape, d, points, tangents, x, a, r)
 
@@ -145,6 +154,44 @@ def _cone(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tuple, 
         (one, 0.0 * x),
         (x, one),
     )
+
+
+def _elliptic(d: Array, P: Array, t: Array, x: Array) -> tuple[Array, Array, tuple, tuple]:
+    """Return straight lines on the unrolled elliptic cylinder; the section's arc by SciPy's elliptic integral."""
+    first, second = d[..., 0], d[..., 1]
+    long, short = np.maximum(first, second), np.minimum(first, second)
+    flat = first < second
+    # u from the end of the minor axis: (long sin u, short cos u), counted against the azimuth
+    px, py = np.where(flat, P[..., 1], P[..., 0]), np.where(flat, -P[..., 0], P[..., 1])
+    tx, ty = np.where(flat, t[..., 1], t[..., 0]), np.where(flat, -t[..., 0], t[..., 1])
+    start = np.arctan2(px / long, py / short)
+    m = 1.0 - (short / long) ** 2
+
+    def rate(u: Array) -> Array:
+        return np.hypot(long * np.cos(u), short * np.sin(u))
+
+    along = unit(np.stack([long * np.cos(start), -short * np.sin(start)], -1))
+    forward = along[..., 0] * tx + along[..., 1] * ty
+    wanted = long * ellipeinc(start, m) + x * forward
+    # Newton's method within brackets; the arc is at least as long as a circle's of the shorter radius
+    reach = np.abs(x * forward) / short
+    low, high = start - reach - 1e-9, start + reach + 1e-9
+    u = start + x * forward / rate(start)
+    for _ in range(INVERSIONS):
+        u = np.where((u < low) | (u > high), 0.5 * (low + high), u)
+        miss = long * ellipeinc(u, m) - wanted
+        low, high = np.where(miss < 0.0, u, low), np.where(miss > 0.0, u, high)
+        step = miss / rate(u)
+        u = u - step
+        if (np.abs(step) < 1e-15).all():
+            break
+    qx, qy = long * np.sin(u), short * np.cos(u)
+    vx, vy = forward * long * np.cos(u) / rate(u), -forward * short * np.sin(u) / rate(u)
+    level, rise = np.broadcast_to(P[..., 2] + x * t[..., 2], u.shape), np.broadcast_to(t[..., 2], u.shape)
+    points = np.stack([np.where(flat, -qy, qx), np.where(flat, qx, qy), level], -1)
+    tangents = np.stack([np.where(flat, -vy, vx), np.where(flat, vx, vy), rise], -1)
+    one = np.ones_like(x)
+    return points, tangents, (one, 0.0 * x), (x, one)
 
 
 def _piece(d: Array, P: Array, t: Array, left: float) -> tuple[Any, float]:

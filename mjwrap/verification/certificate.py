@@ -16,7 +16,7 @@ import numpy as np
 
 import mjwrap as mw
 from mjwrap.verification.arcs import Arcs, arcs_of
-from mjwrap.verification.shapes import SHAPES, Array, Ints, Shape, half_length, orthogonal_unit, sizes
+from mjwrap.verification.shapes import SHAPES, Array, Ints, Shape, half_length, orthogonal_unit, sizes, unit
 
 ON_SURFACE = 1e-12  # distance of contact points from their surface, a hundred roundings of 0.1 m [m]
 DIRECTION = 1e-8  # sine of the angle between a segment and its geodesic; the solver asks for 1e-10
@@ -26,6 +26,10 @@ ENTERING = 1e-12  # depth of a straight segment below a surface [m]
 LIFTING = 1e-9  # negative normal curvature, relative to the largest
 SLIPPING = 1e-9  # negative stiffness against sideways shifts, relative to the largest
 SHORT = 1e-6  # the direction of a shorter segment is too inaccurate for the arc after it [m]
+BOTH_SHORT = 1e-6  # segments before and after an arc that are shorter leave its direction to its ends [m]
+NO_AIM = 1e-10  # shorter ones have no direction to start the search for it [m]
+AIMS = 8  # Newton steps of this search
+DIRECTIONS = 24  # directions from which it is begun if there is none
 ROUNDING = 1e-15  # rounding error of a point [m]: a shorter segment has no direction
 SEGMENT_SAMPLES = 257  # points along a straight segment beside a surface that is not convex
 NARROWING = 60  # golden-section steps between two samples
@@ -174,6 +178,33 @@ def _tangent(n: Array, e: Array) -> Array:
     return np.where((size > 0.5)[:, None], t / np.maximum(size, 1e-300)[:, None], orthogonal_unit(n))
 
 
+def _aimed(shape: Shape, d: Array, P: Array, t: Array, s: Array, Q: Array) -> Array:
+    """Return tangents (m, 3) turned so that the geodesics of length s pass Q without a sideways miss."""
+    n = shape.normal(d, P)
+    for _ in range(AIMS):
+        arcs = arcs_of(shape, d, P, t, s)
+        aside = np.cross(arcs.t, shape.normal(d, arcs.Q))
+        r = arcs.jacobi[:, 2]
+        miss = ((Q - arcs.Q) * aside).sum(1)
+        turn = np.clip(miss / np.where(np.abs(r) > 1e-3 * s, r, np.inf), -0.3, 0.3)
+        t = unit(t + turn[:, None] * np.cross(t, n))
+    return t
+
+
+def _found(shape: Shape, d: Array, P: Array, s: Array, Q: Array) -> Array:
+    """Return tangents (m, 3) of geodesics of length s from P that end nearest to Q, of many directions."""
+    n = shape.normal(d, P)
+    u = orthogonal_unit(n)
+    v = np.cross(n, u)
+    tangents, misses = [], []
+    for angle in np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False):
+        t = _aimed(shape, d, P, np.cos(angle) * u + np.sin(angle) * v, s, Q)
+        tangents.append(t)
+        misses.append(np.linalg.norm(arcs_of(shape, d, P, t, s).Q - Q, axis=1))
+    best = np.array(misses).argmin(0)
+    return np.array(tangents)[best, np.arange(len(s))]
+
+
 def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
     """Return the touches by kind of surface, with the geodesics that continue the arriving segments."""
     kinds: dict[type, list[Touch]] = {}
@@ -204,6 +235,13 @@ def grouped(cases: Sequence[Case], touches: list[Touch]) -> list[Group]:
         if short.any():
             start = -_tangent(shape.normal(d[short], Q[short]), e2[short])
             t[short] = _tangent(n[short], -arcs_of(shape, d[short], Q[short], start, s[short]).t)
+        # two short segments: the direction in which a geodesic reaches Q
+        short = np.array([max(touch.before, touch.after) < BOTH_SHORT for touch in found]) & (s > SHORT)
+        if short.any():
+            t[short] = _aimed(shape, d[short], P[short], t[short], s[short], Q[short])
+            blind = np.array([max(touch.before, touch.after) < NO_AIM for touch in found]) & (s > SHORT)
+            if blind.any():
+                t[blind] = _found(shape, d[blind], P[blind], s[blind], Q[blind])
         arcs = arcs_of(shape, d, P, t, s)
         ends = shape.normal(d, arcs.Q)
         for k, touch in enumerate(found):
@@ -236,7 +274,7 @@ def _judge_contacts(cases: Sequence[Case], group: Group, verdict: Verdict) -> No
             verdict.refute(touch.case, f"{word}: obstacle {touch.index}, misses Q by {missed[k]:.1e} m")
         for e, tangent, size in ((touch.arriving, t, touch.before), (touch.leaving, w, touch.after)):
             error = float(np.linalg.norm(e - tangent))
-            if size > 1e3 * ROUNDING and error > DIRECTION + 10.0 * ROUNDING / size:
+            if size > 1e3 * ROUNDING and error > DIRECTION + 10.0 * ROUNDING * (1.0 / size + steepest[k]):
                 word = "folded" if e @ tangent < 0.0 else "not tangent"
                 verdict.refute(touch.case, f"{word}: obstacle {touch.index} by {error:.1e}")
         if arcs.bending[k] < -LIFTING * max(steepest[k], 1.0):

@@ -53,7 +53,8 @@ def _stop(model: mujoco.MjModel, node: Node) -> str:
     if node.surface is None:
         return _site(model, node.site)
     side = f", side {_site(model, node.hint_site)}" if node.hint_site >= 0 else ""
-    return f"{_geom(model, node.geom)} ({type(node.surface).__name__.lower()}{side})"
+    held = ", held inside" if node.inside else ""
+    return f"{_geom(model, node.geom)} ({type(node.surface).__name__.lower()}{side}{held})"
 
 
 def _site(model: mujoco.MjModel, site: int) -> str:
@@ -94,4 +95,5 @@ def _stop_values(model: mujoco.MjModel, node: Node) -> dict[str, Any]:
         "surface": type(node.surface).__name__,
         "sizes": list(node.surface.dims),
         "side_site": _site(model, node.hint_site) if node.hint_site >= 0 else None,
+        "held_inside": node.inside,
     }

@@ -20,7 +20,15 @@ from mjwrap.kernels.geometry.clearance import (
     lowest_over_cone,
     part_between,
 )
-from mjwrap.kernels.geometry.closed_forms import capsule, cone, cylinder, sphere
+from mjwrap.kernels.geometry.closed_forms import (
+    capsule,
+    cone,
+    cylinder,
+    slide_over_seam,
+    sphere,
+    way_over_shaft,
+)
+from mjwrap.kernels.geometry.elliptic_cylinder import elliptic_cylinder
 from mjwrap.kernels.geometry.projection import (
     height_over_capsule,
     height_over_cone,
@@ -46,7 +54,7 @@ from mjwrap.kernels.geometry.winding import (
     winding_about_tube,
 )
 
-KIND, DIM, SIZE = lay.KIND, lay.DIM, lay.SIZE
+KIND, DIM, SIZE, POS, ROT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.ROT
 NAN = math.nan
 
 # `lowest_by_samples`, for surfaces that are not convex; lengths are shares of the surface's size.
@@ -80,8 +88,10 @@ def evaluate_geodesic(k, node):
         cylinder(k, node)
     elif kind == lay.SPHERE:
         sphere(k, node)
-    elif kind == lay.ELLIPSOID or kind == lay.ELLIPTIC_CYLINDER:
+    elif kind == lay.ELLIPSOID:
         quadric(k, node)
+    elif kind == lay.ELLIPTIC_CYLINDER:
+        elliptic_cylinder(k, node)
     elif kind == lay.TORUS:
         torus(k, node)
     elif kind == lay.CONE:
@@ -245,6 +255,54 @@ def lowest_by_samples(node, k, first, last, ax, ay, az, dx, dy, dz):
                 best, lowest = (one, h_one) if h_one < h_two else (two, h_two)
         before, here = here, after
     return best
+
+
+# ------------------------------------------------------- seams, over which the curvature of a surface jumps
+
+
+@jit
+def has_seams(k, node):
+    """Return whether the curvature of obstacle k's surface jumps somewhere."""
+    return node[k, KIND] == lay.CAPSULE
+
+
+@jit
+def slide_past_seam(k, node, ends, point, tangent, binormal, slide, shift, share, bend, slope):
+    """Return the slide of a contact along its tangent [m], changed where a share of it leads over a seam of row k.
+
+    ends: as for `solve_span`; point, tangent, binormal: columns of the contact; shift: its move along its binormal;
+    bend, slope: normal curvature, and rate of the error with the slide.
+    """
+    z, along = _along_axis(k, node, ends, point, tangent)
+    aside = shift * (
+        node[k, ROT + 2] * node[k, binormal]
+        + node[k, ROT + 5] * node[k, binormal + 1]
+        + node[k, ROT + 8] * node[k, binormal + 2]
+    )
+    return slide_over_seam(node[k, DIM], node[k, DIM + 1], z, along, aside, slide, share, bend, slope)
+
+
+@jit
+def way_to_seam(k, node, ends, point, tangent, bend, deviation):
+    """Return the way along its tangent by which a contact gets behind the next seam of row k, signed [m].
+
+    0 where there is no seam that way, or where the surface turns by as much as the deviation [rad] before it; the sign
+    of the deviation is that of the way. bend: normal curvature at the contact.
+    """
+    z, along = _along_axis(k, node, ends, point, tangent)
+    return way_over_shaft(node[k, DIM], node[k, DIM + 1], z, along, bend, deviation)
+
+
+@jit
+def _along_axis(k, node, ends, point, tangent):
+    """Return the height of a contact along row k's local z [m], and the rise of its tangent."""
+    ux, uy, uz = node[k, ROT + 2], node[k, ROT + 5], node[k, ROT + 8]
+    z = (
+        ux * (node[k, point] + ends[0] - node[k, POS])
+        + uy * (node[k, point + 1] + ends[1] - node[k, POS + 1])
+        + uz * (node[k, point + 2] + ends[2] - node[k, POS + 2])
+    )
+    return z, ux * node[k, tangent] + uy * node[k, tangent + 1] + uz * node[k, tangent + 2]
 
 
 # -------------------------------------------------- winding angle, for the kinds with the trait BRANCHED

@@ -7,6 +7,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit, no_inline
 from mjwrap.kernels.geometry.dispatch import evaluate_geodesic, project
+from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.vectors import cross
 
 W_P, W_Q, W_TP, W_TQ, W_NP, W_NQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ, lay.W_NP, lay.W_NQ
@@ -57,3 +58,30 @@ def displace(k, d0, d1, d2, d3, node):
     node[k, S_T + 1] = ty * inverse
     node[k, S_T + 2] = tz * inverse
     node[k, S_ARC] += d3
+
+
+@jit
+def move_start_along(k, node, ends, way):
+    """Move the start of obstacle k's geodesic along it by `way`, forwards or backwards [m]; its end point stays.
+
+    ends: as for `solve_span`.
+    """
+    if way == 0.0:
+        return
+    arc = node[k, S_ARC]
+    node[k, S_ARC] = way
+    geodesic(k, node, ends[0], ends[1], ends[2])
+    x, y, z = (
+        node[k, W_Q] - node[k, W_P],
+        node[k, W_Q + 1] - node[k, W_P + 1],
+        node[k, W_Q + 2] - node[k, W_P + 2],
+    )
+    x, y, z = turn_into_frame(node, k, x, y, z)
+    node[k, S_P] += x
+    node[k, S_P + 1] += y
+    node[k, S_P + 2] += z
+    x, y, z = turn_into_frame(node, k, node[k, W_TQ], node[k, W_TQ + 1], node[k, W_TQ + 2])
+    node[k, S_T] = x
+    node[k, S_T + 1] = y
+    node[k, S_T + 2] = z
+    node[k, S_ARC] = arc - way

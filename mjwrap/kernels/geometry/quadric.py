@@ -1,8 +1,10 @@
-"""Geodesics of the ellipsoid and the elliptic cylinder (1/c = 0), x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, in Cartesian space.
+"""Geodesics of the ellipsoid, x^2/a^2 + y^2/b^2 + z^2/c^2 = 1, in Cartesian space, and points of both quadrics.
 
 With g = (x/a^2, y/b^2, z/c^2), half the gradient, S = g.g and T = t.A t, A = diag(1/a^2, 1/b^2, 1/c^2), the geodesic
 obeys p'' = -(T/S) g, and Joachimsthal's integral C = T S is constant along it. So p'' = -(C/S^2) g and K = det A / S^2
 depend on the position alone. Stoermer's rule integrates p and both Jacobi fields with one division per substep.
+
+Nearest points are here for the elliptic cylinder (1/c = 0) as well; its geodesics are in `elliptic_cylinder.py`.
 """
 
 from __future__ import annotations
@@ -142,8 +144,7 @@ def _step(h, rate, c, d, gx, gy, gz, ux, uy, uz, a, da, r, dr, ia, ib, ic):
         v[9, i] -= size * (d * v[4, i])
     over = 1.0 / h
     error = max(abs(combine(v, 0, ERROR_WEIGHT)) / ia, abs(combine(v, 1, ERROR_WEIGHT)) / ib)
-    if ic != 0.0:
-        error = max(error, abs(combine(v, 2, ERROR_WEIGHT)) / ic)
+    error = max(error, abs(combine(v, 2, ERROR_WEIGHT)) / ic)
     error = max(max(error, abs(combine(v, 4, ERROR_WEIGHT))) * rate, abs(combine(v, 3, ERROR_WEIGHT)))
     return (
         error, combine(v, 0, WEIGHT), combine(v, 1, WEIGHT), combine(v, 2, WEIGHT),
@@ -211,33 +212,10 @@ def quadric(k, node):
         longest = 1e300
         left = 0.0 if h == left else left - h
         square = gx * gx + gy * gy + gz * gz
-    x, y, tx, ty = gx / ia, gy / ib, ux / ia, uy / ib
-    if ic != 0.0:
-        z, tz = gz / ic, uz / ic
-    else:
-        z += gone * tz
+    x, y, z = gx / ia, gy / ib, gz / ic
+    tx, ty, tz = ux / ia, uy / ib, uz / ic
     x, y, z = onto(ia, ib, ic, x, y, z)
     nx, ny, nz, tx, ty, tz, kappa, tau, beta = _frame(ia, ib, ic, x, y, z, tx, ty, tz)
     put_end(node, k, x, y, z, tx, ty, tz, nx, ny, nz)
     put_curvature(node, k, lay.W_KQ, kappa, tau, beta)
     put_fields(node, k, a, da, r, dr, kappa, least)
-    if ic == 0.0:
-        node[k, lay.W_ANGLE] = _angle(node, k, x, y, tx, ty)
-
-
-@jit
-def _angle(node, k, x, y, tx, ty):
-    """Return the angle from P to Q about an elliptic cylinder's axis, in the image in which it is round [rad]."""
-    a, b = node[k, DIM], node[k, DIM + 1]
-    px, py, qx, qy = node[k, S_P] / a, node[k, S_P + 1] / b, x / a, y / b
-    angle = math.atan2(px * qy - py * qx, px * qx + py * qy)
-    way = node[k, S_ARC] * math.sqrt(tx * tx + ty * ty)  # seen along the axis
-    if abs(way) < 2.0 * min(a, b):  # less than half a turn
-        return angle
-    turn = math.copysign(1.0, (qx * ty / b - qy * tx / a) * way)
-    if angle * turn < 0.0:
-        angle += turn * 2.0 * math.pi
-    h = ((a - b) / (a + b)) ** 2  # circumference by Ramanujan's formula
-    round_it = math.pi * (a + b) * (1.0 + 3.0 * h / (10.0 + math.sqrt(4.0 - 3.0 * h)))
-    share = abs(way) / round_it - abs(angle) / (2.0 * math.pi)
-    return angle + turn * 2.0 * math.pi * max(math.floor(share + 0.5), 0.0)

@@ -72,6 +72,16 @@ SHORTEST = 1e-150  # [m]
 
 
 @jit
+def _shortest(k, node, normal, ex, ey, ez):
+    """Return the length below which a segment at row k is none [m]; e: its direction, away from its other end.
+
+    One that rises steeply to the surface begins at an end that a rounded number has put below it.
+    """
+    rise = ex * node[k, normal] + ey * node[k, normal + 1] + ez * node[k, normal + 2]
+    return (lay.AS_WRITTEN if rise > 0.5 else ON_SURFACE) * node[k, lay.SIZE]
+
+
+@jit
 def _write_arriving_segment(k, node, x, y, z, px, py, pz, i, points):
     """Write the segment from (x, y, z) to (px, py, pz), at point i and node k; return whether it has a length."""
     ex, ey, ez = px - x, py - y, pz - z
@@ -81,10 +91,10 @@ def _write_arriving_segment(k, node, x, y, z, px, py, pz, i, points):
     good = size > SHORTEST
     over = 1.0 / (size + SHORTEST)
     ex, ey, ez = ex * over, ey * over, ez * over
-    if points[i, D_TOUCHED] != FIXED and size <= ON_SURFACE * node[k, lay.SIZE]:
+    if points[i, D_TOUCHED] != FIXED and size <= _shortest(k, node, lay.W_NP, ex, ey, ez):
         good = False
         ex, ey, ez = node[k, lay.W_TP], node[k, lay.W_TP + 1], node[k, lay.W_TP + 2]
-    elif points[i - 1, D_TOUCHED] != FIXED and size <= ON_SURFACE * node[near, lay.SIZE]:
+    elif points[i - 1, D_TOUCHED] != FIXED and size <= _shortest(near, node, lay.W_NQ, -ex, -ey, -ez):
         good = False
         ex, ey, ez = node[near, lay.W_TQ], node[near, lay.W_TQ + 1], node[near, lay.W_TQ + 2]
     points[i, D_E] = ex

@@ -12,6 +12,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
+from mjwrap.kernels.wraps.ruled import INSIDE
 
 G_NEAR = 0
 G_FAR = 1
@@ -21,6 +22,48 @@ G_E = 8  # unit vector (3)
 SEGMENT = 11
 
 VANISHING = 1e-200  # a segment that is not longer has no direction [m]
+
+
+@jit
+def _height_over_contact(k, at_p, x, y, z, node):
+    """Return the height of a point, relative to the base, over the tangent plane at P or Q of row k [m]."""
+    point, normal = (lay.W_P, lay.W_NP) if at_p else (lay.W_Q, lay.W_NQ)
+    return (
+        node[k, normal] * (x - node[k, point])
+        + node[k, normal + 1] * (y - node[k, point + 1])
+        + node[k, normal + 2] * (z - node[k, point + 2])
+    )
+
+
+@jit
+def is_below_contact(k, at_p, x, y, z, node):
+    """Return whether an end next to P or Q of row k, relative to the base, lies inside a surface that keeps it out."""
+    return (
+        node[k, lay.INSIDE] == 0.0
+        and _height_over_contact(k, at_p, x, y, z, node) < (INSIDE - 1.0) * node[k, lay.SIZE]
+    )
+
+
+@jit
+def set_pull_at_end(j, k, at_p, node, base, seg):
+    """Make segment j the force between the surface of row k and an end inside it, acting at the end: e = (I + h W)^-1 t.
+
+    at_p: the end is the string's first point, next to P, else its last one, next to Q. e is not a unit vector but minus
+    the gradient of the length with respect to the end; see `spans/end_inside.py`.
+    """
+    end, other = (G_A, G_B) if at_p else (G_B, G_A)
+    tangent, binormal = (lay.W_TP, lay.W_BP) if at_p else (lay.W_TQ, lay.W_BQ)
+    curvature = lay.W_KP if at_p else lay.W_KQ
+    x, y, z = seg[j, end] - base[0], seg[j, end + 1] - base[1], seg[j, end + 2] - base[2]
+    h = _height_over_contact(k, at_p, x, y, z, node)
+    kappa, tau, beta = node[k, curvature], node[k, curvature + 1], node[k, curvature + 2]
+    # the inverse of [[1 + h κ, h τ], [h τ, 1 + h β]] in the frame (t, b), times t
+    over = 1.0 / ((1.0 + h * kappa) * (1.0 + h * beta) - h * h * tau * tau)
+    along, aside = (1.0 + h * beta) * over, -h * tau * over
+    for i in range(3):
+        seg[j, G_E + i] = along * node[k, tangent + i] + aside * node[k, binormal + i]
+        # both points of the segment are the end: the force acts there on the surface's body, too
+        seg[j, other + i] = seg[j, end + i]
 
 
 @jit
@@ -61,6 +104,15 @@ def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
         seg[count, G_E] = ex
         seg[count, G_E + 1] = ey
         seg[count, G_E + 2] = ez
+        # an end that a rounded number has put below the surface on which it lies
+        to_surface = k < hi and node[k, lay.KIND] != lay.VIA
+        from_surface = near >= lo and node[near, lay.KIND] != lay.VIA
+        if to_surface and not from_surface and size <= lay.AS_WRITTEN * node[k, lay.SIZE]:
+            if is_below_contact(k, True, x, y, z, node):
+                set_pull_at_end(count, k, True, node, (ox, oy, oz), seg)
+        elif from_surface and not to_surface and size <= lay.AS_WRITTEN * node[near, lay.SIZE]:
+            if is_below_contact(near, False, px, py, pz, node):
+                set_pull_at_end(count, near, False, node, (ox, oy, oz), seg)
         count += 1
         near = k
         x, y, z = px, py, pz

@@ -14,8 +14,11 @@ that the gradient with respect to A is -(I + h W)^-1 t. As a force e it acts bet
 A. It grows without bound where the nearest point is not unique, at an axis or a centre; so the path from F is used down
 to half of that depth only.
 
-There is no substitute on a surface whose wraps have to be searched for: ellipsoid, capsule, torus, user's surface. In
-tests the wraps from two neighbouring F were on different sides in some of 10,000 small steps, and in many with both
+An end that is as little inside as a number written with six digits may put it (AS_WRITTEN) lies on the surface: its
+substitute path is the path, and its status CONVERGED.
+
+Deeper inside there is no substitute on a surface whose wraps have to be searched for: ellipsoid, capsule, torus, user's
+surface. In tests the wraps from two neighbouring F were on different sides in some of 10,000 small steps, and in many with both
 ends inside one capsule. See "An end inside a surface" in docs/derivation.md.
 """
 
@@ -27,10 +30,10 @@ from numba.core import types
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, inlined, jit
-from mjwrap.kernels.geometry.dispatch import nearest
+from mjwrap.kernels.geometry.dispatch import height, nearest
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.geometry.traits import closed_form
-from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, list_segments
+from mjwrap.kernels.solved.segments import G_A, G_B, G_FAR, G_NEAR, list_segments, set_pull_at_end
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
@@ -54,6 +57,20 @@ def _nearest_surface_point(k, ends, column, node):
         node[k, POS + 1] + node[k, ROT + 3] * x + node[k, ROT + 4] * y + node[k, ROT + 5] * z - ends[1],
         node[k, POS + 2] + node[k, ROT + 6] * x + node[k, ROT + 7] * y + node[k, ROT + 8] * z - ends[2],
     )
+
+
+@jit
+def lies_on_surfaces(lo, hi, ends, node):
+    """Return whether no end of the span lies deeper inside an obstacle than AS_WRITTEN: on its surface, or outside."""
+    for k in range(lo, hi):
+        least = -lay.AS_WRITTEN * node[k, lay.SIZE]
+        for column in range(3, 9, 3):
+            x, y, z = into_frame(
+                node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
+            )
+            if height(node, k, x, y, z) < least:
+                return False
+    return True
 
 
 @jit
@@ -127,7 +144,9 @@ def substitute_path(lo, hi, ends, node, tol, direct):
     # a path that leaves F and touches the same surface again, behind a hollow, is not covered
     good = good and (a < 0 or leaves_a or node[k, lay.W_L] <= ON_SURFACE * node[k, lay.SIZE])
     good = good and (b < 0 or leaves_b or node[j, lay.W_LQ] <= ON_SURFACE * node[j, lay.SIZE])
-    if status != lay.CONVERGED or not good:
+    # the path of an end that lies on the surface needs no more than to be found
+    shallow = lies_on_surfaces(lo, hi, ends, node)
+    if status != lay.CONVERGED or not (good or shallow):
         return best, NO_SUBSTITUTE, iterations, evaluations
     save_solutions(lo, hi, node, lay.W_START)
     # the paths that ignore the surface of A, of B, and of both; over_a, over_b: it is ignored
@@ -151,7 +170,7 @@ def substitute_path(lo, hi, ends, node, tol, direct):
             iterations += i
             evaluations += e
         # where the string leaves F without touching, the path that ignores the surface is needed
-        if status != lay.CONVERGED and ((over_a and leaves_a) or (over_b and leaves_b)):
+        if status != lay.CONVERGED and not shallow and ((over_a and leaves_a) or (over_b and leaves_b)):
             return best, NO_SUBSTITUTE, iterations, evaluations
         if status == lay.CONVERGED and length > best:
             _lift_all(lo, first, node)
@@ -175,23 +194,6 @@ def has_valid_length(status, error):
 
 
 @jit
-def _set_substitute_pull(j, k, point, tangent, normal, binormal, curvature, end, node, base, seg):
-    """Make segment j the force of a substitute path between surface and end, acting at the end: e = (I + h W)^-1 t."""
-    # height of the end over the contact, negative
-    h = 0.0
-    for i in range(3):
-        h += node[k, normal + i] * (seg[j, end + i] - base[i] - node[k, point + i])
-    kappa, tau, beta = node[k, curvature], node[k, curvature + 1], node[k, curvature + 2]
-    # the inverse of [[1 + h κ, h τ], [h τ, 1 + h β]] in the frame (t, b), times t
-    over = 1.0 / ((1.0 + h * kappa) * (1.0 + h * beta) - h * h * tau * tau)
-    along, aside = (1.0 + h * beta) * over, -h * tau * over
-    for i in range(3):
-        seg[j, G_E + i] = along * node[k, tangent + i] + aside * node[k, binormal + i]
-        # both points of the segment are the end: the force acts there on the surface's body, too
-        seg[j, G_A + i + G_B - end] = seg[j, end + i]
-
-
-@jit
 def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
     """Write the segments of a substitute path as `list_segments` does; the one at an end inside has no length.
 
@@ -206,9 +208,7 @@ def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
         to_surface = far < hi and node[far, KIND] != lay.VIA
         a, b, c = seg[j, G_A], seg[j, G_A + 1], seg[j, G_A + 2]
         if to_surface and not from_surface and node[far, lay.INSIDE] == 0.0 and contains(far, node, a, b, c):
-            _set_substitute_pull(
-                j, far, lay.W_P, lay.W_TP, lay.W_NP, lay.W_BP, lay.W_KP, G_A, node, base, seg
-            )
+            set_pull_at_end(j, far, True, node, base, seg)
         a, b, c = seg[j, G_B], seg[j, G_B + 1], seg[j, G_B + 2]
         if (
             from_surface
@@ -216,7 +216,5 @@ def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
             and node[near, lay.INSIDE] == 0.0
             and contains(near, node, a, b, c)
         ):
-            _set_substitute_pull(
-                j, near, lay.W_Q, lay.W_TQ, lay.W_NQ, lay.W_BQ, lay.W_KQ, G_B, node, base, seg
-            )
+            set_pull_at_end(j, near, False, node, base, seg)
     return count

@@ -17,16 +17,18 @@ from numba.core import types
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
-from mjwrap.kernels.geometry.traits import closed_form
+from mjwrap.kernels.geometry.traits import branched, closed_form
+from mjwrap.kernels.geometry.winding import TWO_PI, nearest_turn
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
-from mjwrap.kernels.spans.end_inside import substitute_path
+from mjwrap.kernels.spans.end_inside import lies_on_surfaces, substitute_path
 from mjwrap.kernels.spans.hinted_sides import meet_hints
+from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
-S_MODE, S_P, S_T = lay.S_MODE, lay.S_P, lay.S_T
+S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 W_OLD, W_START, W_START_ERROR = lay.W_OLD, lay.W_START, lay.W_START_ERROR
 COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
 
@@ -175,12 +177,27 @@ def _continue_to_present_ends(k, end, now, node, tol):
     return spent
 
 
+@jit
+def _is_unwound(lo, hi, node):
+    """Return whether a string that W_START had wound by more than a turn about a surface has lost a turn or more."""
+    for k in range(lo, hi):
+        before = node[k, W_START + S_SWEEP - S_MODE]
+        if (
+            branched(k, node)
+            and node[k, lay.TOUCH] == 0.0
+            and abs(before) > TWO_PI
+            and abs(nearest_turn(node[k, S_SWEEP], before) - node[k, S_SWEEP]) > 1.0
+        ):
+            return True
+    return False
+
+
 @deferred(types.int64, types.float64, types.float64, types.int64, types.int64)
 def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
     """Solve again after a large move, by continuation from the last pose; where that fails, from a cold start.
 
     found: the solve before has found a path; where the continuation fails, the solution before the move is used again
-    instead of a cold start.
+    instead. A cold start that unwinds a string wound by more than a turn has not found its path (NO_GEODESIC).
     """
     evaluations = 0
     restore_solutions(lo, hi, ends, node, W_OLD)
@@ -196,16 +213,25 @@ def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
     if not _is_found(status):
         if found:
             restore_solutions(lo, hi, ends, node, W_START)
-        else:
+        else:  # without the contacts, but on the branch
+            restore_solutions(lo, hi, ends, node, W_START)
             for k in range(lo, hi):
-                node[k, S_MODE] = COLD
+                remove_contact(k, node)
         status, total, error, i, e = solve_active_set(lo, hi, ends, node, tol, direct)
         iterations += i
         evaluations += e
-        if not found and status == lay.CONVERGED and _any_hinted(lo, hi, node):
+    if not found and not _is_found(status):
+        for k in range(lo, hi):
+            node[k, S_MODE] = COLD
+        status, total, error, i, e = solve_active_set(lo, hi, ends, node, tol, direct)
+        iterations += i
+        evaluations += e
+        if status == lay.CONVERGED and _any_hinted(lo, hi, node):
             status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error)
             iterations += i
             evaluations += e
+        if status == lay.CONVERGED and _is_unwound(lo, hi, node):
+            status = lay.NO_GEODESIC
     # `chain.solve_motion` takes this as a sign that the extrapolated start was bad
     node[lo, lay.W_RESTARTS] += 1.0
     if status != lay.CONVERGED:
@@ -222,7 +248,8 @@ def solve_span(lo, hi, ends, node, tol, direct):
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     replaces it by the new one; a path that is lost is searched for as at a cold start. With `direct` a lone obstacle is
     wrapped in closed form; of its saved solution only the branch is used. Where an end lies inside a surface, length,
-    error and saved solution are those of the substitute path (`end_inside.py`).
+    error and saved solution are those of the substitute path (`end_inside.py`), which is the path where the end is as
+    little inside as a rounded number may put it.
     """
     warm = not any_in_mode(lo, hi, node, COLD)
     if direct and warm and hi - lo == 1 and closed_form(lo, node):
@@ -250,4 +277,6 @@ def solve_span(lo, hi, ends, node, tol, direct):
         total, error, i, e = substitute_path(lo, hi, ends, node, tol, direct)
         iterations += i
         evaluations += e
+        if error <= tol and lies_on_surfaces(lo, hi, ends, node):
+            status = lay.CONVERGED
     return status, total, error, iterations, evaluations

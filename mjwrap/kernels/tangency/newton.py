@@ -11,12 +11,19 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import inlined, jit, no_inline
-from mjwrap.kernels.geometry.dispatch import project
+from mjwrap.kernels.geometry.dispatch import height, project
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.tangency.block_elimination import solve_newton_system
 from mjwrap.kernels.tangency.path_error import dot_columns
-from mjwrap.kernels.tangency.tangency_error import connect_segments, ends_on_surface, evaluate
+from mjwrap.kernels.tangency.seams import any_seams, move_to_seams, step_over_seams
+from mjwrap.kernels.tangency.tangency_error import (
+    LEAST_HEIGHT,
+    ON_SURFACE,
+    connect_segments,
+    ends_on_surface,
+    evaluate,
+)
 
 S_MODE, S_P, S_ARC, SIZE = lay.S_MODE, lay.S_P, lay.S_ARC, lay.SIZE
 W_E, W_L, W_NP, W_Y, W_SAVE = lay.W_E, lay.W_L, lay.W_NP, lay.W_Y, lay.W_SAVE
@@ -24,6 +31,9 @@ W_START_ERROR = lay.W_START_ERROR
 TOUCHED = lay.TOUCHED
 
 AT_END = 1e-11  # a contact nearer to an end on the surface than this share of the size has reached the end
+MAX_END_MOVE = (
+    0.3  # an end that has moved less on the surface takes the contact with it, as a share of the size
+)
 MAX_TURN = 0.5  # largest change of direction in one step [rad]
 MAX_SHIFT = 0.5  # largest shift of a contact point in one step, in the surface's size
 MAX_STRETCH = 1.0  # largest lengthening of a geodesic in one step, in the surface's size, beside half its arc
@@ -40,12 +50,18 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     iteration also stops where the Newton system is singular, and where no shortened step reduces ||f||.
     """
     square, evaluations = init(lo, hi, ends, node, square)
+    aimed = _aim_at_end_on_surface(lo, hi, ends, node)
+    if aimed >= 0:
+        square = evaluate(lo, hi, ends, node)
+        evaluations += 1
     iterations = 0
     moved = True
     while moved and not terminate(square, iterations, tol, max_iterations):
         moved, square, i, e = step(lo, hi, ends, node, square)
         iterations += i
         evaluations += e
+    if aimed >= 0:
+        node[aimed, lay.W_END_TARGET] = 0.0
     return math.sqrt(square), iterations, evaluations
 
 
@@ -74,18 +90,30 @@ def step(lo, hi, ends, node, square):
     Returns (whether ||f|| went down, ||f||^2, iterations, evaluations); iterations is 0 where the Newton system is
     singular, else 1. Where no share of the step reduces ||f||, ||f||^2 is the old one and the rows hold the last trial.
     """
-    if not solve_newton_system(lo, hi, node):
-        return False, square, 0, 0
+    seamed = any_seams(lo, hi, node)
+    moves = 0
+    solved = solve_newton_system(lo, hi, node)
+    if seamed and move_to_seams(lo, hi, ends, node, MAX_SHIFT if solved else 0.0):
+        square = evaluate(lo, hi, ends, node)
+        moves = 1
+        solved = solve_newton_system(lo, hi, node)
+    if not solved:
+        return False, square, 0, moves
     share = _step_limit(lo, hi, node)
     if not math.isfinite(share) or share <= 0.0:
-        return False, square, 1, 0
+        return False, square, 1, moves
+    if seamed:
+        step_over_seams(lo, hi, share, ends, node)
     _save(lo, hi, node)
-    evaluations = 0
+    evaluations = moves
     trial = square
     for _ in range(MAX_HALVINGS):
         _move(lo, hi, share, node)
         trial = evaluate(lo, hi, ends, node)
         evaluations += 1
+        if not trial < square and _stop_at_end_on_surface(lo, hi, node):
+            trial = evaluate(lo, hi, ends, node)
+            evaluations += 1
         if trial < square:
             break
         share *= 0.5
@@ -157,7 +185,11 @@ def _start_at_end_on_surface(lo, hi, ends, node):
         if node[k, S_MODE] != TOUCHED:
             continue
         normal = dot_columns(node, k, W_E, k, W_NP)
-        if node[k, W_L] <= AT_END * node[k, SIZE] or not ends_on_surface(k, -normal, node[k, W_L], node):
+        size, bend = node[k, W_L], node[k, lay.W_KP]
+        if size <= AT_END * node[k, SIZE]:
+            return False
+        on = ends_on_surface(k, -normal, size, bend, node)
+        if not on and not _stays_on_surface(k, lay.S_BEFORE, size, ends, 3, node):
             return False
         x, y, z = into_frame(node, k, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5])
         x, y, z, _, _, _ = project(node, k, x, y, z)
@@ -165,5 +197,51 @@ def _start_at_end_on_surface(lo, hi, ends, node):
         node[k, S_P + 1] = y
         node[k, S_P + 2] = z
         displace(k, 0.0, 0.0, 0.0, 0.0, node)
+        return True
+    return False
+
+
+@jit
+def _stays_on_surface(k, before, size, ends, column, node):
+    """Return whether an end of the path lies on row k's surface and did so in the path before; then it has moved on it.
+
+    before: column of the length of the straight segment at that end in the path before; size: its length now [m].
+    """
+    if node[k, before] > ON_SURFACE * node[k, SIZE] or size > MAX_END_MOVE * node[k, SIZE]:
+        return False
+    x, y, z = into_frame(
+        node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
+    )
+    return abs(height(node, k, x, y, z)) <= LEAST_HEIGHT * node[k, SIZE]
+
+
+@jit
+def _aim_at_end_on_surface(lo, hi, ends, node):
+    """If the path ends on the surface as it did before, aim Q at the end, which has moved; return the row, else -1."""
+    for k in range(hi - 1, lo - 1, -1):
+        if node[k, S_MODE] != TOUCHED:
+            continue
+        if node[k, lay.W_END_ON_SURFACE] != 0.0 or node[k, lay.W_END_TARGET] != 0.0:
+            return -1
+        if not _stays_on_surface(k, lay.S_BEFORE + 1, node[k, lay.W_LQ], ends, 6, node):
+            return -1
+        node[k, lay.W_END_TARGET] = 1.0
+        return k
+    return -1
+
+
+@jit
+def _stop_at_end_on_surface(lo, hi, node):
+    """If the path ends on the surface, near Q, let the geodesic end there; return whether it was changed.
+
+    Where the last straight segment vanishes, the distance from the end takes the place of its direction, and counts for
+    more: without this a step that reaches the end but for a little would be refused.
+    """
+    for k in range(hi - 1, lo - 1, -1):
+        if node[k, S_MODE] != TOUCHED:
+            continue
+        if node[k, lay.W_END_ON_SURFACE] == 0.0 or node[k, lay.W_END_TARGET] != 0.0:
+            return False
+        node[k, S_ARC] -= node[k, lay.W_CQ + 1]  # (Q - B)·t
         return True
     return False

@@ -22,6 +22,7 @@ from mjwrap.kernels.tangency.path_error import (
 S_MODE, SIZE, TOUCHED = lay.S_MODE, lay.SIZE, lay.TOUCHED
 W_P, W_Q, W_TP, W_TQ = lay.W_P, lay.W_Q, lay.W_TP, lay.W_TQ
 W_E, W_L, W_CP, W_CQ, W_LQ, W_EQ = lay.W_E, lay.W_L, lay.W_CP, lay.W_CQ, lay.W_LQ, lay.W_EQ
+W_KP, W_KQ = lay.W_KP, lay.W_KQ
 W_END_ON_SURFACE, W_END_TARGET = lay.W_END_ON_SURFACE, lay.W_END_TARGET
 
 ON_SURFACE = 1e-6  # a straight segment shorter than this share of the size ends on the surface
@@ -29,7 +30,8 @@ LEAST_HEIGHT = 2e-12  # an end point less high above the surface than this share
 # distance of Q from an end on the surface, as a share of the size, that counts as a direction error of 1 rad
 END_DISTANCE_SCALE = 0.01
 CORNER = 1e-6  # two contacts that meet form a corner if half the angle between them is larger [rad]
-POINT_ROUNDING = 4e-16  # rounding error of a point [m]; divided by a segment's length, that of its direction
+# rounding error of a point [m]; divided by a segment's length, that of its direction; times a curvature, of the normal
+POINT_ROUNDING = 2e-15
 
 
 @jit
@@ -76,14 +78,14 @@ def connect_segments(lo, hi, ends, node):
         node[k, W_E + 2] = dz
         node[k, W_L] = size
         along, normal, binormal = path_error_at_P(k, node)
-        if last < 0 and ends_on_surface(k, -normal, size, node):
+        if last < 0 and ends_on_surface(k, -normal, size, node[k, W_KP], node):
             along, normal, binormal = 1.0, 0.0, 0.0
         node[k, W_CP] = along
         node[k, W_CP + 1] = normal
         node[k, W_CP + 2] = binormal
         corner = meets and (1.0 - along) ** 2 + normal * normal + binormal * binormal > CORNER**2
         # a corner counts in full, also where the segment is short
-        total += _error_share(along, normal, binormal, 1.0 if corner else size)
+        total += _error_share(along, normal, binormal, 1.0 if corner else size, node[k, W_KP])
         if last >= 0:
             total += _enter_leaving_segment(last, dx, dy, dz, size, False, node)
         x, y, z = node[k, W_Q], node[k, W_Q + 1], node[k, W_Q + 2]
@@ -109,7 +111,7 @@ def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
     node[j, W_LQ] = size
     node[j, W_END_ON_SURFACE] = 0.0
     along, normal, binormal = path_error_at_Q(j, node)
-    if last and (node[j, W_END_TARGET] != 0.0 or ends_on_surface(j, normal, size, node)):
+    if last and (node[j, W_END_TARGET] != 0.0 or ends_on_surface(j, normal, size, node[j, W_KQ], node)):
         # a vanishing segment has no direction: rows 2 and 3 of h are components of Q - B
         node[j, W_END_ON_SURFACE] = 1.0
         node[j, W_CQ] = 0.0
@@ -119,21 +121,27 @@ def _enter_leaving_segment(j, ex, ey, ez, size, last, node):
     node[j, W_CQ] = along
     node[j, W_CQ + 1] = normal
     node[j, W_CQ + 2] = binormal
-    return _error_share(along, normal, binormal, size)
+    return _error_share(along, normal, binormal, size, node[j, W_KQ])
 
 
 @inlined
-def ends_on_surface(k, rise, size, node):
+def ends_on_surface(k, rise, size, bend, node):
     """Return whether the path ends on obstacle k's surface, so that there is no straight segment at that end.
 
     size: distance from the contact to the end [m]; rise: component of the unit vector to the end along the surface's
-    normal. It may be negative: an end counts as inside the surface only beyond a certain depth.
+    normal. It may be negative: an end counts as inside the surface only beyond a certain depth. bend: normal curvature
+    at the contact, by which a tangent as short as that rises.
     """
-    return size <= ON_SURFACE * node[k, SIZE] and size * rise <= LEAST_HEIGHT * node[k, SIZE]
+    least = node[k, SIZE]
+    return size <= ON_SURFACE * least and size * rise <= LEAST_HEIGHT * least * (1.0 + least * abs(bend))
 
 
 @inlined
-def _error_share(along, normal, binormal, size):
-    """Return the share |e - t|^2 of one contact point in ||f||^2 (18); zero where it is within rounding errors."""
+def _error_share(along, normal, binormal, size, bend):
+    """Return the share |e - t|^2 of one contact point in ||f||^2 (18); zero where it is within rounding errors.
+
+    A point rounded by δ turns a segment by δ / size, and the surface's normal by δ bend.
+    """
     share = (1.0 - along) ** 2 + normal * normal + binormal * binormal
-    return share if share * size * size > POINT_ROUNDING * POINT_ROUNDING else 0.0
+    least = POINT_ROUNDING * (1.0 + size * abs(bend))
+    return share if share * size * size > least * least else 0.0

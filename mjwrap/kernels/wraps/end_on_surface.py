@@ -13,7 +13,7 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.dispatch import height, project
-from mjwrap.kernels.geometry.geodesics import displace, geodesic
+from mjwrap.kernels.geometry.geodesics import displace, geodesic, move_start_along
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.vectors import unit
@@ -100,11 +100,12 @@ def polish_shot(k, ends, node, side, high_a, high_b, angle, arc):
     _start_geodesic(k, node, px, py, pz, angle, arc)
     # a geodesic shot from B is the path backwards: reverse it
     if side == TO_B:
-        _move_start_along(k, node, ends, arc)
+        move_start_along(k, node, ends, arc)
         for i in range(3):
             node[k, S_T + i] = -node[k, S_T + i]
         node[k, S_ARC] = arc
-    return _polish_on_surface(k, ends, node, side == FROM_A, side == TO_B, high_a, high_b)
+    # the other end may be low, too
+    return polish_from_low_ends(k, ends, node, high_a, high_b)
 
 
 @jit
@@ -125,34 +126,10 @@ def _polish_on_surface(k, ends, node, from_a, to_b, high_a, high_b):
     arc = node[k, S_ARC]
     bend_p, bend_q = node[k, lay.W_KP], node[k, lay.W_KQ]
     if from_a and bend_p > 0.0:
-        _move_start_along(k, node, ends, min(math.sqrt(2.0 * max(high_a, 0.0) / bend_p), arc))
+        move_start_along(k, node, ends, min(math.sqrt(2.0 * max(high_a, 0.0) / bend_p), arc))
     if to_b and bend_q > 0.0:
         node[k, S_ARC] = max(node[k, S_ARC] - math.sqrt(2.0 * max(high_b, 0.0) / bend_q), 0.0)
     return polish(k, ends, node, NOT_EVALUATED)
-
-
-@jit
-def _move_start_along(k, node, ends, way):
-    """Move the start of obstacle k's geodesic along it by `way` [m]; its end point stays."""
-    if not way > 0.0:
-        return
-    arc = node[k, S_ARC]
-    node[k, S_ARC] = way
-    geodesic(k, node, ends[0], ends[1], ends[2])
-    x, y, z = (
-        node[k, W_Q] - node[k, W_P],
-        node[k, W_Q + 1] - node[k, W_P + 1],
-        node[k, W_Q + 2] - node[k, W_P + 2],
-    )
-    x, y, z = turn_into_frame(node, k, x, y, z)
-    node[k, S_P] += x
-    node[k, S_P + 1] += y
-    node[k, S_P + 2] += z
-    x, y, z = turn_into_frame(node, k, node[k, W_TQ], node[k, W_TQ + 1], node[k, W_TQ + 2])
-    node[k, S_T] = x
-    node[k, S_T + 1] = y
-    node[k, S_T + 2] = z
-    node[k, S_ARC] = arc - way
 
 
 @jit
@@ -237,7 +214,7 @@ def _march_into_sight(k, node, px, py, pz, angle, ends, end):
             break
         low = high
         way += step
-        _move_start_along(k, node, ends, step)
+        move_start_along(k, node, ends, step)
         node[k, S_ARC] = step
     if high < 0.0:
         return False, 0.0, 0.0

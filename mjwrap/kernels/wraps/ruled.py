@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
+from mjwrap.kernels.geometry.elliptic_cylinder import ellipse_arc
 from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
+from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 
 DIM, HINT = lay.DIM, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
@@ -24,12 +24,13 @@ S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, la
 INSIDE = 1.0 - 1e-9  # a point is inside if its distance from the axis is less than this share of the radius
 LEAST_BEND = 1e-12  # a wrap with a smaller arc angle counts as not touching [rad]
 
+LEAST_TANGENT = (
+    ON_SURFACE  # an end whose straight tangent is shorter than this share of the radius is on the surface
+)
+
 A_INSIDE = 1
 B_INSIDE = 2
 SLIPPED = 4  # the string winds about a cone and would slip over its apex
-
-# quadrature of an ellipse's arc, for each radian or less
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @jit
@@ -112,6 +113,27 @@ def _sweep(k, node, ax, ay, bx, by):
 
 
 @jit
+def tangent_length(square, least):
+    """Return the length of the straight tangent to a circle, from its square; 0 below `least`.
+
+    Where the path ends on the surface there is no straight segment (`tangency_error.ends_on_surface`).
+    """
+    return math.sqrt(square) if square > least * least else 0.0
+
+
+@jit
+def _tangent_to_ellipse(px, py, square, a, b):
+    """Return `tangent_length` in the affine image in which the ellipse is a unit circle, from the point (px, py).
+
+    square: of the point's distance from the centre there.
+    """
+    root = math.sqrt(max(square - 1.0, 0.0))
+    if root <= LEAST_TANGENT and root * math.hypot(a * py, b * px) <= LEAST_TANGENT * min(a, b):
+        return 0.0
+    return root
+
+
+@jit
 def _contact_normal(ax, ay, radius, root, turn):
     """Return the unit vector at A's polar angle, turned by the angle whose cosine is radius / rho."""
     square = ax * ax + ay * ay
@@ -128,8 +150,8 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     square_a, square_b, square = ax * ax + ay * ay, bx * bx + by * by, radius * radius
     limit = INSIDE * INSIDE * square
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
-    root_a = math.sqrt(max(square_a - square, 0.0))
-    root_b = math.sqrt(max(square_b - square, 0.0))
+    least = LEAST_TANGENT * radius
+    root_a, root_b = tangent_length(square_a - square, least), tangent_length(square_b - square, least)
     sweep = _sweep(k, node, ax, ay, bx, by)
     if _hinted(k, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
@@ -159,31 +181,16 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
 
 
 @jit
-def _ellipse_arc(a, b, start, arc):
-    """Return the length of the ellipse (a cos w, b sin w) from w = start over the signed angle arc, by Gauss' rule."""
-    pieces = int(math.ceil(abs(arc)))
-    half = 0.5 * arc / max(pieces, 1)
-    total = 0.0
-    for j in range(pieces):
-        middle = start + (2 * j + 1) * half
-        for i in range(_NODES.shape[0]):
-            w = middle + half * _NODES[i]
-            x, y = a * math.sin(w), b * math.cos(w)
-            total += _WEIGHTS[i] * math.sqrt(x * x + y * y)
-    return abs(half) * total
-
-
-@jit
 def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
-    """Wrap a string from A to B over an elliptic cylinder about z; relative error of the arc length about 1e-10."""
+    """Wrap a string from A to B over an elliptic cylinder about z."""
     a, b = node[k, DIM], node[k, DIM + 1]
     # in the affine image in which the cross-section is the unit circle, tangents are tangents
     px, py, qx, qy = ax / a, ay / b, bx / a, by / b
     square_a, square_b = px * px + py * py, qx * qx + qy * qy
     limit = INSIDE * INSIDE
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
-    root_a = math.sqrt(max(square_a - 1.0, 0.0))
-    root_b = math.sqrt(max(square_b - 1.0, 0.0))
+    root_a = _tangent_to_ellipse(px, py, square_a, a, b)
+    root_b = _tangent_to_ellipse(qx, qy, square_b, a, b)
     sweep = _sweep(k, node, px, py, qx, qy)
     if _hinted(k, node):
         hint_x, hint_y = node[k, HINT + 1] / a, node[k, HINT + 2] / b
@@ -198,7 +205,7 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     nx, ny = _contact_normal(px, py, 1.0, root_a, turn)
     mx, my = _contact_normal(qx, qy, 1.0, root_b, -turn)
     out = math.hypot(a * nx - ax, b * ny - ay)
-    round_it = _ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
+    round_it = ellipse_arc(a, b, math.atan2(ny, nx), turn * arc)
     # lengths seen along the axis are not those of the affine image
     flat = out + round_it + math.hypot(a * mx - bx, b * my - by)
     slope = (bz - az) / flat
@@ -223,7 +230,7 @@ def _tangent_ruling(rho, radius):
     # inside the cone, or inside its mirror image beyond the apex, there is no tangent plane
     if rho <= abs(radius):
         return (0.0 if radius > 0.0 else math.pi), 0.0
-    root = math.sqrt((rho - radius) * (rho + radius))
+    root = tangent_length((rho - radius) * (rho + radius), LEAST_TANGENT * abs(radius))
     return math.atan2(root, radius), root
 
 

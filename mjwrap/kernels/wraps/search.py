@@ -36,6 +36,7 @@ from mjwrap.kernels.wraps.end_on_surface import (
     polish_shot,
     shoot_geodesics,
 )
+from mjwrap.kernels.wraps.ends_from_above import search_from_above
 from mjwrap.kernels.wraps.initial_guess import (
     guess_in_half_plane,
     height_of_section,
@@ -52,7 +53,7 @@ COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 NEAR_HINT = 5  # half planes within 60 degrees of the hint
 DIRECTIONS = 12  # number of half planes around AB
-CLEAR_DEPTH = 1e-10  # a segment that goes less deep below a surface, in the surface's size, is clear of it
+CLEAR_DEPTH = 1e-9  # a segment that goes less deep below a surface, in the surface's size, is clear of it
 SAME_BRANCH = 1.0  # winding angles that differ by less belong to the same branch [rad]
 
 
@@ -285,6 +286,13 @@ def _search(
                 for c in range(lay.STATE):
                     memory[c] = node[k, S_MODE + c]
             j += 1
+    low = min(high_a, high_b) <= low_end_height(k, node)
+    a, b = (ax, ay, az), (ax + dx, ay + dy, az + dz)
+    if not found and low and not winds and search_from_above(k, ends, node, a, b, high_a, high_b, hinted):
+        found, fresh = True, -1
+        node[k, S_SWEEP] = 0.0
+        for i in range(lay.STATE):
+            memory[i] = node[k, S_MODE + i]
     node[k, S_MODE] = TOUCHED
     # if the best one was the last that was tried, the row still holds its evaluation
     if found and fresh == j:

@@ -23,9 +23,11 @@ from mjwrap.kernels.wraps.ruled import (
     B_INSIDE,
     INSIDE,
     LEAST_BEND,
+    LEAST_TANGENT,
     SLIPPED,
     asked_sweep,
     set_free,
+    tangent_length,
     wrap_cone,
     wrap_cylinder,
     wrap_elliptic_cylinder,
@@ -76,8 +78,8 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
     square_a, square_b, square = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, radius * radius
     limit = INSIDE * INSIDE * square
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
-    root_a = math.sqrt(max(square_a - square, 0.0))
-    root_b = math.sqrt(max(square_b - square, 0.0))
+    least = LEAST_TANGENT * radius
+    root_a, root_b = tangent_length(square_a - square, least), tangent_length(square_b - square, least)
     # angle of the arc: the angle between A and B, minus the angles of the straight tangents
     wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     sweep = math.atan2(math.sqrt(wx * wx + wy * wy + wz * wz), ax * bx + ay * by + az * bz)
@@ -90,7 +92,7 @@ def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
     rho = max(math.sqrt(square_a), 1e-300)
     ux, uy, uz = ax / rho, ay / rho, az / rho
     vx, vy, vz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
-    c, d = min(radius / rho, 1.0), root_a / rho
+    c, d = min(radius / rho, 1.0) if root_a > 0.0 else 1.0, root_a / rho
     node[k, S_MODE] = lay.TOUCHED
     node[k, S_SWEEP] = sweep
     node[k, S_P] = radius * (c * ux + d * vx)
