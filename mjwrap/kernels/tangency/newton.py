@@ -59,7 +59,10 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     iterations = 0
     moved = True
     while moved and not terminate(square, iterations, tol, max_iterations):
-        moved, square, i, e = step(lo, hi, ends, node, square, seamed)
+        if seamed:
+            moved, square, i, e = _step_with_seams(lo, hi, ends, node, square)
+        else:
+            moved, square, i, e = step(lo, hi, ends, node, square, False)
         iterations += i
         evaluations += e
     if aimed >= 0:
@@ -90,7 +93,8 @@ def step(lo, hi, ends, node, square, seamed=True):
     """Take one damped Newton step from rows that hold an evaluation with ||f||^2 = square.
 
     Returns (whether ||f|| went down, ||f||^2, iterations, evaluations); iterations is 0 where the Newton system is
-    singular, else 1. seamed: whether a touched surface may have seams. Where no share of the step reduces ||f||, ||f||^2 is the old one and the rows hold the last trial.
+    singular, else 1. Where no share of the step reduces ||f||, ||f||^2 is the old one and the rows hold the last trial.
+    seamed: whether a touched surface may have seams.
     """
     solved = solve_newton_system(lo, hi, node)
     if seamed and move_to_seams(lo, hi, ends, node, MAX_SHIFT if solved else 0.0):
@@ -232,6 +236,12 @@ def _aim_at_end_on_surface(k, lo, hi, ends, node, square):
         return -1, square
     node[k, lay.W_END_TARGET] = 1.0
     return k, _evaluate(lo, hi, ends, node)
+
+
+@no_inline
+def _step_with_seams(lo, hi, ends, node, square):
+    """Take the same step where a touched surface has seams: a copy of its own, so that other paths are as fast."""
+    return step(lo, hi, ends, node, square, True)
 
 
 @no_inline
