@@ -21,7 +21,11 @@ def scene(rng: np.random.Generator, spread: float) -> tuple[Array, Array, mw.Cap
     ends: list[Any] = []
     for way in (1.0, -1.0):
         angle, far = rng.uniform(0.0, 2.0 * np.pi), radius * spread * np.sqrt(rng.random())
-        ends.append(np.array([far * np.cos(angle), far * np.sin(angle), way * (radius + half + rng.uniform(0.01, 0.1))]))
+        ends.append(
+            np.array(
+                [far * np.cos(angle), far * np.sin(angle), way * (radius + half + rng.uniform(0.01, 0.1))]
+            )
+        )
     return ends[0], ends[1], mw.Capsule(radius, half)
 
 
@@ -47,10 +51,14 @@ def test_a_warm_move_over_the_seams_does_not_depend_on_its_steps() -> None:
             continue
         shifts = rng.normal(size=(2, 3)) * capsule.radius * 0.8
 
-        def moved(steps: int, start: mw.PathSolution = start, shifts: Array = shifts) -> list[mw.PathSolution]:
+        def moved(
+            steps: int, start: mw.PathSolution = start, shifts: Array = shifts
+        ) -> list[mw.PathSolution]:
             path, found = start, [start]
             for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
-                path = mw.solve_path(origin + share * shifts[0], insertion + share * shifts[1], row, start=path)  # noqa: B023
+                path = mw.solve_path(
+                    origin + share * shifts[0], insertion + share * shifts[1], row, start=path
+                )  # noqa: B023
                 found.append(path)
             return found
 

@@ -35,11 +35,16 @@ def test_a_rounded_end_on_a_surface_has_the_path_of_its_exact_twin(letter: str) 
     """Position, orientation, sizes and both ends are rounded: the end gets inside in about half of the scenes."""
     rng, inside, compared = np.random.default_rng(21), 0, 0
     while compared < CASES:
-        exact = mw.Obstacle(random_surface(rng, letter), tuple(0.1 * rng.normal(size=3)), tuple(rng.normal(size=4)))
+        exact = mw.Obstacle(
+            random_surface(rng, letter), tuple(0.1 * rng.normal(size=3)), tuple(rng.normal(size=4))
+        )
         origin = nearest(exact, nearest(exact, exact.pos + 0.04 * rng.normal(size=3)))[0]
         towards = rng.normal(size=3)
         insertion = exact.pos + towards / np.linalg.norm(towards) * rng.uniform(0.1, 0.3)
-        if isinstance(exact.surface, mw.Cone) and abs(local(exact, origin)[0, 2]) > 0.8 * exact.surface.half_length:
+        if (
+            isinstance(exact.surface, mw.Cone)
+            and abs(local(exact, origin)[0, 2]) > 0.8 * exact.surface.half_length
+        ):
             continue
         if height(exact, insertion[None])[0] < 0.01:
             continue

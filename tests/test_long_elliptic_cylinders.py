@@ -60,7 +60,9 @@ def test_arcs_and_geodesics_are_exact_to_rounding(aspect: float) -> None:
             geodesics.geodesic(0, node, 0.0, 0.0, 0.0)
             stop = mp.mpf(start) + mp.mpf(turn)
             exact = np.array([float(a * mp.cos(stop)), float(b * mp.sin(stop))])
-            assert np.linalg.norm(node[0, lay.W_Q : lay.W_Q + 2] - exact) < 4e-15 * (abs(float(arc)) + max(a, b))
+            assert np.linalg.norm(node[0, lay.W_Q : lay.W_Q + 2] - exact) < 4e-15 * (
+                abs(float(arc)) + max(a, b)
+            )
             assert node[0, lay.W_ANGLE] == pytest.approx(turn, abs=4e-15 * aspect * (1.0 + abs(turn)))
 
 
@@ -142,7 +144,9 @@ def test_a_wound_string_keeps_its_winding_however_the_motion_is_cut() -> None:
             for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
                 quat = (1.0, *(0.5 * share * twist))
                 row = [mw.Obstacle(obstacle.surface, quat=quat)]
-                path = mw.solve_path(origin + share * shifts[0], insertion + share * shifts[1], row, start=path)
+                path = mw.solve_path(
+                    origin + share * shifts[0], insertion + share * shifts[1], row, start=path
+                )
                 assert path.converged
             lengths.append(path.length)
         assert max(lengths) - min(lengths) < 1e-13
