@@ -16,7 +16,16 @@ import mjwrap as mw
 from mjwrap.surfaces import Surface
 from mjwrap.verification.arcs import arcs_of
 from mjwrap.verification.certificate import ENTERING, Case, deepest, findings, rotation
-from mjwrap.verification.scenes import _clear, height, local, point_towards, random_scene, random_surface
+from mjwrap.verification.scenes import (
+    _clear,
+    height,
+    local,
+    nearest,
+    outward,
+    point_towards,
+    random_scene,
+    random_surface,
+)
 from mjwrap.verification.shapes import SHAPES, Array, half_length, sizes, unit
 
 CLASSES = {
@@ -33,8 +42,11 @@ CLASSES = {
     "16 of all kinds": "?" * 16,
     "64 in a row": "+" * 64,
     "64 of all kinds": "?" * 64,
+    "long elliptic cylinder": "L",
+    "capsule lengthwise": "p",
+    "ends near a surface": ".",
 }
-WILD = {"?": "cselktp", "+": "cse"}  # letters from which each obstacle of each scene is drawn
+WILD = {"?": "cselktp", "+": "cse", ".": "cselkp"}  # letters from which each obstacle of each scene is drawn
 POOL = 150  # number of geodesics of each kind that are drawn together
 TRIES = 40  # number of positions tried for one surface of a chain
 BACKTRACKS = 3  # number of links tried per surface of a chain
@@ -159,6 +171,33 @@ def _quaternion(R: Array) -> tuple[float, ...]:
     return tuple(float(x) for x in np.linalg.eigh(K)[1][:, -1][[0, 1, 2, 3]])
 
 
+def _lengthwise(rng: np.random.Generator, letters: str) -> tuple[Array, Array, list[mw.Obstacle]]:
+    """Return ends beyond the caps of a capsule, within three radii of its axis."""
+    surface = random_surface(rng, letters)
+    assert isinstance(surface, mw.Capsule)
+    row = [mw.Obstacle(surface, tuple(0.05 * rng.normal(size=3)), tuple(rng.normal(size=4)))]
+    spread, ends = rng.uniform(0.0, 3.0), []
+    for way in (1.0, -1.0):
+        angle, far = rng.uniform(0.0, 2.0 * np.pi), surface.radius * spread * np.sqrt(rng.random())
+        beyond = surface.half_length + surface.radius + rng.uniform(0.01, 0.1)
+        ends.append([far * np.cos(angle), far * np.sin(angle), way * beyond])
+    world = np.array(ends) @ rotation(row[0].quat).T + row[0].pos
+    return world[0], world[1], row
+
+
+def _ends_near(rng: np.random.Generator, letters: str) -> tuple[Array, Array, list[mw.Obstacle]]:
+    """Return ends at heights of 1e-14 to 1e-3 sizes over a surface."""
+    surface = random_surface(rng, letters)
+    row = [mw.Obstacle(surface, tuple(0.05 * rng.normal(size=3)), tuple(rng.normal(size=4)))]
+    ends = 0.04 * rng.normal(size=(2, 3))
+    if isinstance(surface, mw.Cone):
+        ends[:, 2] = rng.uniform(-0.8, 0.8, 2) * surface.half_length
+    ends = nearest(row[0], nearest(row[0], ends @ rotation(row[0].quat).T + row[0].pos))
+    high = surface.size * 10.0 ** rng.uniform(-14.0, -3.0, (2, 1))
+    ends = ends + high * outward(row[0], ends)
+    return ends[0], ends[1], row
+
+
 class Maker:
     """Scenes of one class from one seed: geodesics from a pool are combined to scenes.
 
@@ -167,8 +206,9 @@ class Maker:
 
     def __init__(self, name: str, seed: int, chunk: int) -> None:
         self.kinds = CLASSES.get(name, name)
-        place = list(CLASSES).index(name) if name in CLASSES else int.from_bytes(name.encode(), "big")
-        self.rng = np.random.default_rng([seed, place, chunk])
+        self.place = {"capsule lengthwise": _lengthwise, "ends near a surface": _ends_near}.get(name)
+        number = list(CLASSES).index(name) if name in CLASSES else int.from_bytes(name.encode(), "big")
+        self.rng = np.random.default_rng([seed, number, chunk])
         letters = sorted({letter for k in self.kinds for letter in WILD.get(k, k)})
         turn = MOST_TURN if len(self.kinds) == 1 else ROW_TURN
         self.pool = {letter: draw_geodesics(self.rng, letter, POOL, turn) for letter in letters}
@@ -192,6 +232,9 @@ class Maker:
     def _placed(self) -> Scene:
         """Return a scene with randomly placed obstacles; a single obstacle has a random orientation."""
         letters = self.letters()
+        if self.place is not None:
+            origin, insertion, row = self.place(self.rng, letters)
+            return Scene(origin, insertion, row, None, self._random_hints(row), None)
         while True:
             origin, insertion, row = random_scene(self.rng, letters, hints=False)
             if len(row) > 1:

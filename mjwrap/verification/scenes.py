@@ -12,7 +12,8 @@ from mjwrap.verification.certificate import Case, findings, rotation
 from mjwrap.verification.shapes import SHAPES, Array, sizes
 
 SURFACES = {"cylinder": mw.Cylinder, "sphere": mw.Sphere, "ellipsoid": mw.Ellipsoid, "torus": mw.Torus}
-LETTERS = "cselktp"  # cylinder, sphere, ellipsoid, elliptic cylinder, cone, torus, capsule
+# cylinder, sphere, ellipsoid, elliptic cylinder, cone, torus, capsule; L: elliptic cylinder of aspect 5 to 100
+LETTERS = "cselktp"
 REACH = 0.25  # length of a surface of a row, from its centre along its axis, that is considered [m]
 MARGIN = 2e-3  # distance between surfaces of a row: more than the error of `gap` [m]
 
@@ -145,6 +146,10 @@ def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) 
         case "k":
             bottom = size(0.015, 0.045)
             return mw.Cone(bottom, rng.uniform(0.2, 0.8) * bottom, rng.uniform(0.08, 0.2))
+        case "L":
+            long = size(0.01, 0.05)
+            sides = (long, long / float(np.exp(rng.uniform(np.log(5.0), np.log(100.0)))))
+            return mw.EllipticCylinder(sides if rng.random() < 0.5 else sides[::-1])
         case "p":
             return mw.Capsule(size(0.01, 0.04), size(0.01, 0.05))
     raise ValueError(f"surface letter must be one of {LETTERS}, not {letter!r}")

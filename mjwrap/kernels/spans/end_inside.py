@@ -29,7 +29,7 @@ import math
 from numba.core import types
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import deferred, inlined, jit
+from mjwrap.kernels.compilation.jit import deferred, inlined, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import height, nearest
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.geometry.traits import closed_form
@@ -59,7 +59,7 @@ def _nearest_surface_point(k, ends, column, node):
     )
 
 
-@jit
+@no_inline
 def lies_on_surfaces(lo, hi, ends, node):
     """Return whether no end of the span lies deeper inside an obstacle than AS_WRITTEN: on its surface, or outside."""
     for k in range(lo, hi):

@@ -50,14 +50,19 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     iteration also stops where the Newton system is singular, and where no shortened step reduces ||f||.
     """
     square, evaluations = init(lo, hi, ends, node, square)
-    aimed = _aim_at_end_on_surface(lo, hi, ends, node)
-    if aimed >= 0:
-        square = evaluate(lo, hi, ends, node)
-        evaluations += 1
+    aimed = -1
+    if square > tol * tol:
+        aimed = _row_at_end_on_surface(lo, hi, node)
+        if aimed >= 0:
+            aimed, square = _aim_at_end_on_surface(aimed, lo, hi, ends, node, square)
+    seamed = any_seams(lo, hi, node)
     iterations = 0
     moved = True
     while moved and not terminate(square, iterations, tol, max_iterations):
-        moved, square, i, e = step(lo, hi, ends, node, square)
+        if seamed:
+            moved, square, i, e = _step_with_seams(lo, hi, ends, node, square)
+        else:
+            moved, square, i, e = step(lo, hi, ends, node, square, False)
         iterations += i
         evaluations += e
     if aimed >= 0:
@@ -84,36 +89,32 @@ def init(lo, hi, ends, node, square):
 
 
 @inlined
-def step(lo, hi, ends, node, square):
+def step(lo, hi, ends, node, square, seamed=True):
     """Take one damped Newton step from rows that hold an evaluation with ||f||^2 = square.
 
     Returns (whether ||f|| went down, ||f||^2, iterations, evaluations); iterations is 0 where the Newton system is
     singular, else 1. Where no share of the step reduces ||f||, ||f||^2 is the old one and the rows hold the last trial.
+    seamed: whether a touched surface may have seams.
     """
-    seamed = any_seams(lo, hi, node)
-    moves = 0
     solved = solve_newton_system(lo, hi, node)
     if seamed and move_to_seams(lo, hi, ends, node, MAX_SHIFT if solved else 0.0):
-        square = evaluate(lo, hi, ends, node)
-        moves = 1
-        solved = solve_newton_system(lo, hi, node)
+        return True, _evaluate(lo, hi, ends, node), 1, 1
     if not solved:
-        return False, square, 0, moves
+        return False, square, 0, 0
     share = _step_limit(lo, hi, node)
     if not math.isfinite(share) or share <= 0.0:
-        return False, square, 1, moves
+        return False, square, 1, 0
     if seamed:
         step_over_seams(lo, hi, share, ends, node)
     _save(lo, hi, node)
-    evaluations = moves
+    evaluations = 0
     trial = square
     for _ in range(MAX_HALVINGS):
         _move(lo, hi, share, node)
         trial = evaluate(lo, hi, ends, node)
         evaluations += 1
-        if not trial < square and _stop_at_end_on_surface(lo, hi, node):
-            trial = evaluate(lo, hi, ends, node)
-            evaluations += 1
+        if not trial < square:
+            trial = _stop_at_end_on_surface(lo, hi, ends, node, trial)
         if trial < square:
             break
         share *= 0.5
@@ -188,8 +189,10 @@ def _start_at_end_on_surface(lo, hi, ends, node):
         size, bend = node[k, W_L], node[k, lay.W_KP]
         if size <= AT_END * node[k, SIZE]:
             return False
-        on = ends_on_surface(k, -normal, size, bend, node)
-        if not on and not _stays_on_surface(k, lay.S_BEFORE, size, ends, 3, node):
+        if not ends_on_surface(k, -normal, size, bend, node) and (
+            node[k, lay.S_BEFORE] > ON_SURFACE * node[k, SIZE]
+            or not _moved_on_surface(k, size, ends, 3, node)
+        ):
             return False
         x, y, z = into_frame(node, k, ends[0] + ends[3], ends[1] + ends[4], ends[2] + ends[5])
         x, y, z, _, _, _ = project(node, k, x, y, z)
@@ -201,13 +204,13 @@ def _start_at_end_on_surface(lo, hi, ends, node):
     return False
 
 
-@jit
-def _stays_on_surface(k, before, size, ends, column, node):
-    """Return whether an end of the path lies on row k's surface and did so in the path before; then it has moved on it.
+@no_inline
+def _moved_on_surface(k, size, ends, column, node):
+    """Return whether an end of the path, which lay on row k's surface in the path before, still does, nearby.
 
-    before: column of the length of the straight segment at that end in the path before; size: its length now [m].
+    size: length of the straight segment at that end, between the end now and the contact before [m].
     """
-    if node[k, before] > ON_SURFACE * node[k, SIZE] or size > MAX_END_MOVE * node[k, SIZE]:
+    if size > MAX_END_MOVE * node[k, SIZE]:
         return False
     x, y, z = into_frame(
         node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
@@ -216,23 +219,40 @@ def _stays_on_surface(k, before, size, ends, column, node):
 
 
 @jit
-def _aim_at_end_on_surface(lo, hi, ends, node):
-    """If the path ends on the surface as it did before, aim Q at the end, which has moved; return the row, else -1."""
+def _row_at_end_on_surface(lo, hi, node):
+    """Return the last touched row if the path before ended on its surface and now seems not to, else -1."""
     for k in range(hi - 1, lo - 1, -1):
-        if node[k, S_MODE] != TOUCHED:
-            continue
-        if node[k, lay.W_END_ON_SURFACE] != 0.0 or node[k, lay.W_END_TARGET] != 0.0:
-            return -1
-        if not _stays_on_surface(k, lay.S_BEFORE + 1, node[k, lay.W_LQ], ends, 6, node):
-            return -1
-        node[k, lay.W_END_TARGET] = 1.0
-        return k
+        if node[k, S_MODE] == TOUCHED:
+            ended = node[k, lay.S_BEFORE + 1] <= ON_SURFACE * node[k, SIZE]
+            known = node[k, lay.W_END_ON_SURFACE] != 0.0 or node[k, lay.W_END_TARGET] != 0.0
+            return k if ended and not known else -1
     return -1
 
 
-@jit
-def _stop_at_end_on_surface(lo, hi, node):
-    """If the path ends on the surface, near Q, let the geodesic end there; return whether it was changed.
+@no_inline
+def _aim_at_end_on_surface(k, lo, hi, ends, node, square):
+    """Aim Q of row k at the end of the path if that has moved on the surface; return (k, ||f||^2), or -1 for k if not."""
+    if not _moved_on_surface(k, node[k, lay.W_LQ], ends, 6, node):
+        return -1, square
+    node[k, lay.W_END_TARGET] = 1.0
+    return k, _evaluate(lo, hi, ends, node)
+
+
+@no_inline
+def _step_with_seams(lo, hi, ends, node, square):
+    """Take the same step where a touched surface has seams: a copy of its own, so that other paths are as fast."""
+    return step(lo, hi, ends, node, square, True)
+
+
+@no_inline
+def _evaluate(lo, hi, ends, node):
+    """Return `evaluate`, where it is called so seldom that its code should not be copied."""
+    return evaluate(lo, hi, ends, node)
+
+
+@no_inline
+def _stop_at_end_on_surface(lo, hi, ends, node, square):
+    """If the path ends on the surface, near Q, let the geodesic end there; return ||f||^2.
 
     Where the last straight segment vanishes, the distance from the end takes the place of its direction, and counts for
     more: without this a step that reaches the end but for a little would be refused.
@@ -241,7 +261,7 @@ def _stop_at_end_on_surface(lo, hi, node):
         if node[k, S_MODE] != TOUCHED:
             continue
         if node[k, lay.W_END_ON_SURFACE] == 0.0 or node[k, lay.W_END_TARGET] != 0.0:
-            return False
+            return square
         node[k, S_ARC] -= node[k, lay.W_CQ + 1]  # (Q - B)·t
-        return True
-    return False
+        return _evaluate(lo, hi, ends, node)
+    return square

@@ -118,7 +118,8 @@ def tangent_length(square, least):
 
     Where the path ends on the surface there is no straight segment (`tangency_error.ends_on_surface`).
     """
-    return math.sqrt(square) if square > least * least else 0.0
+    root = math.sqrt(max(square, 0.0))
+    return root if root > least else 0.0
 
 
 @jit
