@@ -14,6 +14,7 @@ from mjwrap.kernels.coupling.groups import Routes
 from mjwrap.kernels.musculotendon import dispatch, dynamics
 from mjwrap.kernels.musculotendon.groups import Muscles
 from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
+from mjwrap.mjcf.side_rules import MUJOCO_4
 from mjwrap.muscles.laws import ActuatorForce, parameter_row
 from mjwrap.surfaces.rows import surface_rows
 
@@ -95,7 +96,9 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 def kernel_rows(node: Node) -> list[Array]:
     """Return the kernels' rows of a stop, for a cold start; several if a string may touch its surface several times."""
     if node.surface is not None:
-        return list(surface_rows(node.surface, node.inside))
+        rows = surface_rows(node.surface, node.inside)
+        rows[:, layout.HINT_RULE] = layout.POLYLINE if node.side_rule == MUJOCO_4 else layout.NEAREST_MIDDLE
+        return list(rows)
     row = np.zeros(layout.ROW)
     row[layout.KIND], row[layout.S_MODE] = layout.VIA, layout.COLD
     return [row]

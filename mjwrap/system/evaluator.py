@@ -27,7 +27,9 @@ class Evaluator(Results):
 
     _last: State
 
-    def __init__(self, model: mujoco.MjModel, *, strict: bool = False) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, *, strict: bool = False, side_rule: int | None = None
+    ) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ModelError(
                 f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
@@ -40,7 +42,7 @@ class Evaluator(Results):
         self.strict = strict
         self._takeover = Takeover(model)
         with self._takeover.original_limits():
-            found = read_declarations(model)
+            found = read_declarations(model, side_rule=side_rule)
         plan = build_plan(model, found.muscles)
         super().__init__(found, plan, model, State(model, plan))
         self._takeover.disable([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])

@@ -33,7 +33,10 @@ class MuscleSystem(Evaluator):
 
     model: an `MjModel`. Muscle actuators that mjwrap takes over keep their activation dynamics but no longer pull:
     their `actuator_forcerange` is zero until `release`. strict: raise `PathError` if a path cannot be found; otherwise
-    the muscle keeps its last valid force for that step. Raises `ModelError` if a declaration is wrong. The results
+    the muscle keeps its last valid force for that step. side_rule: the rule by which the side site of a tendon picks
+    the way round a cylinder, at the first pose and after `reset`: 3 for MuJoCo 3's, 4 for MuJoCo 4's; None for the
+    running MuJoCo's, or that of the `install` before `without_plugin`. The hints of mjwrap's tuples have their own
+    meaning under both. Raises `ModelError` if a declaration is wrong. The results
     `length`, `velocity`, `tension`, `activation` and `status`, each (n,), are those of the last `forward`, `apply` or
     `step`, at the state at which the forces acted. SI units; lengthening and tension are positive.
     """

@@ -25,13 +25,15 @@ Array = NDArray[np.float64]
 class Results:
     """Lengths, velocities, tensions, statuses and paths at the last evaluation, as copies.
 
-    declarations: the declaration of each muscle; native: muscle actuators that stay with MuJoCo, with the reasons.
+    declarations: the declaration of each muscle; native: muscle actuators that stay with MuJoCo, with the reasons;
+    side_rule: by which the side sites of tendons pick the way round a cylinder, 3 or 4.
     """
 
     def __init__(self, found: Declarations, plan: Plan, model: mujoco.MjModel, last: Evaluation) -> None:
         self.model = model
         self.declarations: list[MuscleDeclaration] = found.muscles
         self.native: dict[str, str] = found.native
+        self.side_rule: int = found.side_rule
         self._plan = plan
         self._last = last
         self._root = np.asarray(model.body_rootid, dtype=np.int64)

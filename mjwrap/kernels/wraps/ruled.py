@@ -59,7 +59,7 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
 
     Where the straight string does not enter the cylinder and its point nearest to the axis lies on that side, it stays
     straight. Otherwise the way round whose middle is nearer to the hint is taken, also if it is the longer one, unless
-    it crosses itself. MuJoCo has the same rule for side sites (`mju_wrap` in engine_util_misc.c).
+    it crosses itself. MuJoCo 3 has the same rule for side sites (`mju_wrap` in engine_util_misc.c).
     """
     size = math.sqrt(hint_x * hint_x + hint_y * hint_y)
     if size < 1e-9 * radius:
@@ -80,12 +80,34 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
     away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     if towards >= away:
         return principal
-    # contact points of the other way, which is not taken if its straight segments cross
-    start -= turn * alpha_a
-    end += turn * alpha_b
+    return _other_way(ax, ay, bx, by, principal, alpha_a, alpha_b, radius)
+
+
+@jit
+def _other_way(ax, ay, bx, by, principal, alpha_a, alpha_b, radius):
+    """Return the swept angle of the longer way round, or of the shorter one if the longer one crosses itself."""
+    turn = 1.0 if principal >= 0.0 else -1.0
+    start = math.atan2(ay, ax) - turn * alpha_a
+    end = math.atan2(by, bx) + turn * alpha_b
     px, py = radius * math.cos(start), radius * math.sin(start)
     qx, qy = radius * math.cos(end), radius * math.sin(end)
-    return principal if _cross_each_other(ax, ay, px, py, bx, by, qx, qy) else other
+    return principal if _cross_each_other(ax, ay, px, py, bx, by, qx, qy) else principal - turn * TWO_PI
+
+
+@jit
+def _polyline_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
+    """Return the swept angle of a string that is pulled tight from the polyline A, hint, B, at a cold start.
+
+    Seen along the axis, each leg of the polyline goes round the axis by less than half a turn. The longer way round is
+    taken only if both legs together do so, and if it does not cross itself. MuJoCo 4 has the same rule for side sites.
+    """
+    if math.sqrt(hint_x * hint_x + hint_y * hint_y) < 1e-9 * radius:
+        return principal
+    first = math.atan2(ax * hint_y - ay * hint_x, ax * hint_x + ay * hint_y)
+    second = math.atan2(hint_x * by - hint_y * bx, hint_x * bx + hint_y * by)
+    if abs(first + second - principal) < math.pi:
+        return principal
+    return _other_way(ax, ay, bx, by, principal, alpha_a, alpha_b, radius)
 
 
 @jit
@@ -124,7 +146,10 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     if _hinted(k, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
-        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+        if node[k, lay.HINT_RULE] == lay.POLYLINE:
+            sweep = _polyline_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+        else:
+            sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
     # angle of the arc: the swept angle minus the angles of the straight tangents
     arc = abs(sweep) - tangents_sweep(root_a, root_b, radius)
     if arc <= LEAST_BEND:
