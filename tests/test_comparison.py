@@ -21,7 +21,7 @@ from mjwrap.comparison import (
 )
 from mjwrap.comparison.paired_evaluation import Comparer
 from mjwrap.comparison.tendons import WrapRecord, tendon_spans
-from mjwrap.poses.continuity import refine_jump
+from mjwrap.poses.continuity import Smallest, refine_jump
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.system import MuscleSystem
 
@@ -75,6 +75,9 @@ COUPLED = """
   <equality><joint joint1="follower" joint2="leader" polycoef=".1 .5 .3 0 0"/></equality>
 </mujoco>
 """
+
+
+LEAST = Smallest(1e-6, 1e-5)  # the smallest jumps to be found
 
 
 def load(text: str) -> mujoco.MjModel:
@@ -306,7 +309,7 @@ def test_jumps_are_found_where_they_are_and_as_large() -> None:
         low = place - rng.uniform(0.0, 0.01)  # an interval of a sweep in a hundred steps
         bend = -float(np.sin(low))
         for size, way in (((length, 0.0), None), ((0.0, slope), bend), ((length, slope), None)):
-            found = refine_jump(jump_at(place, *size), low, low + 0.01, 1.0, way)
+            found = refine_jump(jump_at(place, *size), low, low + 0.01, 1.0, way, LEAST)
             assert found is not None
             assert found[0] == pytest.approx(place, abs=2e-9)
             assert found[1:] == pytest.approx(size, rel=1e-3, abs=1e-8)
@@ -320,7 +323,7 @@ def test_a_steep_stretch_is_no_jump(width: float) -> None:
         return rise, 0.01 / (1.0 + np.exp(-x))
 
     for bend in (0.0, None):
-        assert refine_jump(probe, 0.37, 0.38, 1.0, bend) is None
+        assert refine_jump(probe, 0.37, 0.38, 1.0, bend, LEAST) is None
 
 
 def test_a_slope_that_grows_without_bound_is_no_jump() -> None:
@@ -329,7 +332,7 @@ def test_a_slope_that_grows_without_bound_is_no_jump() -> None:
         return 0.1 * x**1.5, 0.15 * x**0.5
 
     for bend in (0.0, None):
-        assert refine_jump(probe, 0.37, 0.38, 1.0, bend) is None
+        assert refine_jump(probe, 0.37, 0.38, 1.0, bend, LEAST) is None
 
 
 def test_with_one_law_both_move_alike() -> None:

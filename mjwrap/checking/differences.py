@@ -30,7 +30,7 @@ class Neighbourhood:
         self._touched = self._contacts()
         self._bad = muscles.status != 0
         self._turns = muscles.model.jnt_type[muscles.model.dof_jntid] == _HINGE
-        self._size = min(1.0, float(np.median(muscles.length)))
+        self._size = float(np.median(muscles.length))
         self._widths = _widths(muscles)
 
     def _contacts(self) -> NDArray[np.int64]:

@@ -66,7 +66,14 @@ class Sweeper:
             place, motion.at, lambda value: self._paths.record(muscles, f"{name} = {value:.4f}")
         )
         self._jumps.count += muscles.n
-        for i, (at, size, turn) in self._follower.jumps(place, trace):
+        for i, (at, size, turn) in self._follower.jumps(place, trace, motion.turning):
+            cause = "" if size else self._follower.moment_arm_break(place, trace, i, at)
+            if cause:
+                self._jumps.remarks.append(
+                    f"not counted: {muscles.names[i]} at {name} = {at:.6f}: moment arm {-1e3 * turn:+.3f} mm; {cause}, "
+                    "and no path has a continuous moment arm"
+                )
+                continue
             before, after = (self._follower.touched(place, trace, i, at + side) for side in (-beside, beside))
             what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
             self._jumps.worst += 1.0

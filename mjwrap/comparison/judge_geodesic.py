@@ -20,6 +20,10 @@ Ints = NDArray[np.int64]
 
 ANGLE = 1e-9  # [rad] largest corner; both programs compute contact points in closed form or to 1e-10
 INSIDE_TOLERANCE = 2e-6  # [rad] the same for MuJoCo's corner inside a geom, which it finds to 1e-6 rad
+SAME_TURN = (
+    1e-3  # [rad] two paths between the same points are on the same branch if their turns differ by less
+)
+OPPOSITE = 1e-6  # [rad] largest angle from opposite, at which rounding may choose the plane of a path
 DEPTH = 1e-12  # [radii] largest depth of a straight segment below a surface, for rounding errors
 
 
@@ -96,6 +100,25 @@ def nearest(a: Array, b: Array, cylinder: bool) -> Array:
     square = _dot(step, step)
     place = np.clip(-_dot(start, step) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
     return start + place[:, None] * step
+
+
+def polyline_turn(a: Array, side: Array, b: Array) -> Array:
+    """Return the angle (T,) by which the polyline a, side, b goes round the axis z, each leg by less than half a turn.
+
+    MuJoCo 4 pulls a string tight from there round a cylinder with a side site. All points are (T, 3).
+    """
+    return sum(
+        np.arctan2(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0], p[:, 0] * q[:, 0] + p[:, 1] * q[:, 1])
+        for p, q in ((a, side), (side, b))
+    )  # pyright: ignore[reportReturnType]
+
+
+def opposite(a: Array, b: Array) -> Flags:
+    """Return whether a and b (T, 3) are opposite to each other, seen from a sphere's centre.
+
+    There all ways round the sphere are equally long, and the nearest one to either side is another one.
+    """
+    return (_norm(np.cross(a, b)) <= OPPOSITE * _norm(a) * _norm(b)) & (_dot(a, b) < 0.0)
 
 
 def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array) -> Judgement:

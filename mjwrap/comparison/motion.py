@@ -112,6 +112,7 @@ def compare_motion(
     key: int = -1,
     qpos: Array | None = None,
     seed: int = 0,
+    side_rule: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> MotionDifference:
     """Simulate a model twice from the same state, along MuJoCo's tendons and along mjwrap's paths.
@@ -123,13 +124,14 @@ def compare_motion(
         key: a keyframe to start from, or -1.
         qpos: (nq,) a start position, in place of a keyframe.
         seed: for random excitations.
+        side_rule: of mjwrap's paths, as for `MuscleSystem`.
         progress: called after every step.
 
     Returns:
         Both motions and their difference.
     """
     native_model, driven_model = pristine(model), pristine(model)
-    muscles = MuscleSystem(driven_model)
+    muscles = MuscleSystem(driven_model, side_rule=side_rule)
     excitation = Excitation(muscles, entries, seed)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):

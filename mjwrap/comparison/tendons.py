@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf import MuscleDeclaration, tendon_stops
+from mjwrap.mjcf import MuscleDeclaration, Node, tendon_stops
+from mjwrap.mjcf.side_rules import MUJOCO_3
 
 Array = NDArray[np.float64]
 _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
@@ -18,7 +19,7 @@ _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
 class Span(NamedTuple):
     """A part of a tendon from one site to the next, over a geom (-1: none); weight: its factor in the length (pulleys).
 
-    inside: whether it must meet the geom's solid.
+    inside: whether it must meet the geom's solid. side_rule: the rule of its side site (`mjcf/side_rules.py`).
     """
 
     start: int
@@ -27,10 +28,13 @@ class Span(NamedTuple):
     hint: int
     weight: float
     inside: bool = False
+    side_rule: int = MUJOCO_3
 
 
-def tendon_spans(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Span]:
-    """Return the spans of a spatial tendon in order. poses: any, with kinematics."""
+def tendon_spans(
+    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = MUJOCO_3
+) -> list[Span]:
+    """Return the spans of a spatial tendon in order. poses: any, with kinematics. side_rule: of its side sites."""
     spans: list[Span] = []
     last, geom, hint, weight, inside = -1, -1, -1, 1.0, False
     for stop in tendon_stops(model, poses, tendon):
@@ -42,7 +46,7 @@ def tendon_spans(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> li
             hint = stop.index
         else:
             if last >= 0:
-                spans.append(Span(last, stop.index, geom, hint, weight, inside))
+                spans.append(Span(last, stop.index, geom, hint, weight, inside, side_rule))
             last, geom, hint, inside = stop.index, -1, -1, False
     return spans
 
@@ -51,16 +55,19 @@ def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
     """Return the spans of a declared muscle, or None if it has several geoms between two sites."""
     spans: list[Span] = []
     for route in muscle.routes:
-        last, geom, hint, inside = route.origin, -1, -1, False
-        for node in route.nodes:
-            if node.geom >= 0:
-                if geom >= 0:
-                    return None
-                geom, hint, inside = node.geom, node.hint_site, node.inside
+        last, over = route.origin, Node()
+        for node in (*route.nodes, Node(site=route.insertion)):
+            if node.geom < 0:
+                spans.append(
+                    Span(
+                        last, node.site, over.geom, over.hint_site, route.weight, over.inside, over.side_rule
+                    )
+                )
+                last, over = node.site, Node()
+            elif over.geom < 0:
+                over = node
             else:
-                spans.append(Span(last, node.site, geom, hint, route.weight, inside))
-                last, geom, hint, inside = node.site, -1, -1, False
-        spans.append(Span(last, route.insertion, geom, hint, route.weight, inside))
+                return None
     return spans
 
 

@@ -45,7 +45,11 @@ class _Elements:
 
 
 def read_tuple(
-    model: mujoco.MjModel, rest: mujoco.MjData, index: int, transmission: bool = False, side_rule: int = MUJOCO_3
+    model: mujoco.MjModel,
+    rest: mujoco.MjData,
+    index: int,
+    transmission: bool = False,
+    side_rule: int = MUJOCO_3,
 ) -> MuscleDeclaration:
     """Return the muscle that a tuple declares; `ModelError`, which names the tuple or muscle and the element, if wrong.
 

@@ -73,9 +73,7 @@ def install(
         return _installed(spec, mode, keep_tendons, side_rule)
 
 
-def _installed(
-    spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: int | None
-) -> mujoco.MjModel:
+def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: int | None) -> mujoco.MjModel:
     rule = _remove_earlier(spec, mode, side_rule)
     model = _compile(spec)
     if int(model.opt.disableflags) & _BOTH_OFF == _BOTH_OFF:

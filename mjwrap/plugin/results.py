@@ -40,7 +40,10 @@ class Muscles(Results):
         self._instances = instances(data.model)
         plan, muscles = read_instances(data.model._address, self._instances)
         super().__init__(
-            Declarations(muscles, side_rule=choose_side_rule(data.model, None)), plan, data.model, Evaluation(plan.n, plan.node, len(plan.routes))
+            Declarations(muscles, side_rule=choose_side_rule(data.model, None)),
+            plan,
+            data.model,
+            Evaluation(plan.n, plan.node, len(plan.routes)),
         )
         self._transmits = any(
             configuration_at(data.model._address, i).mode == TRANSMISSION for i in self._instances

@@ -27,9 +27,7 @@ class Evaluator(Results):
 
     _last: State
 
-    def __init__(
-        self, model: mujoco.MjModel, *, strict: bool = False, side_rule: int | None = None
-    ) -> None:
+    def __init__(self, model: mujoco.MjModel, *, strict: bool = False, side_rule: int | None = None) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ModelError(
                 f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"

@@ -72,7 +72,7 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
         return principal
     turn = 1.0 if principal >= 0.0 else -1.0
     # the middle of the arc, as an angle about the axis: the shorter way round, then the other one
-    start, end = math.atan2(ay, ax), math.atan2(by, bx)
+    start = math.atan2(ay, ax)
     middle = start + 0.5 * (principal + turn * (alpha_a - alpha_b))
     towards = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     other = principal - turn * TWO_PI

@@ -1,0 +1,37 @@
+"""Poses at which no path has a continuous moment arm: ties of equally long ways round a sphere, and kinks."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from mjwrap.kernels import layout
+from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.system import MuscleSystem
+
+TIE = "the line between its neighbours passes through a sphere's centre, so that all ways round are equally long"
+KINK = "two of its stops coincide"
+NEAR = (
+    1e-6  # largest angle from a tie [rad], and largest distance from a kink as a share of the muscle's size
+)
+
+
+def moment_arm_break(muscles: MuscleSystem, data: mujoco.MjData, i: int, size: float) -> str:
+    """Return why muscle i, of this size [m], has no moment arm at the last evaluation, of data; empty if it has one."""
+    last, plan = muscles._evaluation(), muscles._plan
+    for c in np.flatnonzero(plan.routes[:, muscle_paths.R_MUSCLE] == i):
+        for row in last.node[plan.routes[c, muscle_paths.R_LO] : plan.routes[c, muscle_paths.R_HI]]:
+            if row[layout.KIND] == layout.SPHERE and row[layout.S_MODE] == layout.TOUCHED:
+                radius = float(row[layout.DIM])
+                straight = (float(row[layout.W_L]), float(row[layout.W_LQ]))
+                swept = float(row[layout.S_ARC]) / radius + sum(math.atan(l / radius) for l in straight)
+                if not row[layout.INSIDE] and abs(swept - math.pi) <= NEAR:
+                    return TIE
+    sites = muscles.poses(data).site_xpos
+    for route in muscles.declarations[i].routes:
+        stops = sites[[route.origin, *(n.site for n in route.nodes if n.site >= 0), route.insertion]]
+        if (np.linalg.norm(np.diff(stops, axis=0), axis=1) <= NEAR * size).any():
+            return KINK
+    return ""
