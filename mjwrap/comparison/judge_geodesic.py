@@ -102,17 +102,6 @@ def nearest(a: Array, b: Array, cylinder: bool) -> Array:
     return start + place[:, None] * step
 
 
-def polyline_turn(a: Array, side: Array, b: Array) -> Array:
-    """Return the angle (T,) by which the polyline a, side, b goes round the axis z, each leg by less than half a turn.
-
-    MuJoCo 4 pulls a string tight from there round a cylinder with a side site. All points are (T, 3).
-    """
-    return sum(
-        np.arctan2(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0], p[:, 0] * q[:, 0] + p[:, 1] * q[:, 1])
-        for p, q in ((a, side), (side, b))
-    )  # pyright: ignore[reportReturnType]
-
-
 def opposite(a: Array, b: Array) -> Flags:
     """Return whether a and b (T, 3) are opposite to each other, seen from a sphere's centre.
 

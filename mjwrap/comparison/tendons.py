@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.mjcf import MuscleDeclaration, Node, tendon_stops
-from mjwrap.mjcf.side_rules import MUJOCO_3
+from mjwrap.mjcf.side_rules import AUTHORS
 
 Array = NDArray[np.float64]
 _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
@@ -28,11 +28,11 @@ class Span(NamedTuple):
     hint: int
     weight: float
     inside: bool = False
-    side_rule: int = MUJOCO_3
+    side_rule: int = AUTHORS
 
 
 def tendon_spans(
-    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = MUJOCO_3
+    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = AUTHORS
 ) -> list[Span]:
     """Return the spans of a spatial tendon in order. poses: any, with kinematics. side_rule: of its side sites."""
     spans: list[Span] = []

@@ -33,7 +33,9 @@ class Outcome(enum.IntEnum):
     MJWRAP_FAILED = 4  # mjwrap found no path, but MuJoCo's is a true geodesic
     MJWRAP_WRONG = 5  # mjwrap's path is not a true geodesic
     UNEXPLAINED = 6  # both are judged to be the same true geodesic, but their numbers differ
-    WRONG_SIDE = 7  # from a cold start mjwrap passes a cylinder not on the side that its hint means, MuJoCo does
+    WRONG_SIDE = (
+        7  # from a cold start mjwrap passes a cylinder not on the side that its hint means, MuJoCo does
+    )
     KINK = 8  # both are the same geodesic, but two of its stops coincide: there is no derivative there
 
 

@@ -15,7 +15,7 @@ this order:
     S_... (11)  the saved solution: all that a warm start needs
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
     HANDLE      address of further data of the surface, 0 where there are none
-    HINT_RULE   how the hint picks the way round a cylinder: NEAREST_MIDDLE or POLYLINE
+    HINT_RULE   how the hint picks the way round a cylinder, as listed below
 
 The columns KIND to Z_LIMIT, which are read most often, fill the row's first cache line.
 
@@ -68,7 +68,10 @@ ABOUT_AXIS = 2.0  # a cylinder about z
 
 # ------------------------------------------------ values of HINT_RULE: the way round a cylinder that a hint means
 NEAREST_MIDDLE = 0.0  # the one whose middle is nearer to the hint
-POLYLINE = 1.0  # that of a string that is pulled tight from the polyline through the hint
+NEAREST_CHORD = 1.0  # the one the middle of whose chord is nearer to the hint: the rule of MuJoCo 3
+POLYLINE = (
+    2.0  # that of a string that is pulled tight from the polyline through the hint: the rule of MuJoCo 4
+)
 
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0

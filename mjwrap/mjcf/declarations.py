@@ -15,7 +15,7 @@ class Node:
 
     inside: the string must meet the solid, as with a side site inside, and is not kept out of it.
     sizes: the numeric that gives the surface's sizes, -1 if the geom gives them. side_rule: the rule by which the hint
-    picks the way round a cylinder (`side_rules.py`); 3 for hints that mjwrap's own tuples give.
+    picks the way round a cylinder (`side_rules.py`); 0 for hints that mjwrap's own tuples list.
     """
 
     site: int = -1
@@ -24,7 +24,7 @@ class Node:
     surface: Surface | None = None
     inside: bool = False
     sizes: int = -1
-    side_rule: int = 3
+    side_rule: int = 0
 
 
 @dataclass(frozen=True)

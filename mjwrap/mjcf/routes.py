@@ -11,7 +11,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.declarations import Node, Route
 from mjwrap.mjcf.inside import end_is_inside, is_beside, side_is_inside
 from mjwrap.mjcf.names import listed, name_of, names
-from mjwrap.mjcf.side_rules import MUJOCO_3
+from mjwrap.mjcf.side_rules import AUTHORS
 from mjwrap.mjcf.wrapping_geoms import read_surface, wrapping_geoms
 
 OBJ = mujoco.mjtObj
@@ -29,7 +29,7 @@ class Stop(NamedTuple):
     divisor: float = 1.0
     finite: bool = False
     inside: bool = False
-    side_rule: int = MUJOCO_3
+    side_rule: int = AUTHORS
 
 
 class _Place(NamedTuple):
@@ -40,12 +40,12 @@ class _Place(NamedTuple):
     finite: bool = False
     inside: bool = False
     hint: int = -1
-    side_rule: int = MUJOCO_3
+    side_rule: int = AUTHORS
     sizes: int = -1
 
 
 def tendon_stops(
-    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = MUJOCO_3
+    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = AUTHORS
 ) -> list[Stop]:
     """Return the stops of a spatial tendon. poses: any, with kinematics. side_rule: of its side sites.
 

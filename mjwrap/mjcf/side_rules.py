@@ -1,9 +1,10 @@
 """The rules by which a side site picks the way round a cylinder; MuJoCo 4 has another one than MuJoCo 3.
 
-Seen along the axis, a string that is bent round a cylinder can go either way. MuJoCo 3 (`mju_wrap`) takes the way whose
-middle is nearer to the side site, even if that is the long way round. MuJoCo 4 takes the way of a string that is pulled
-tight from the polyline that leads from one end over the side site to the other: the long way only if the two legs of
-this polyline together go round the axis by more than half a turn.
+Seen along the axis, a string that is bent round a cylinder can go either way. MuJoCo 3 (`mju_wrap`) compares the
+middles of the chords between the contact points, and takes the way whose middle lies in a direction nearer to that of
+the side site, even if that is the long way round. MuJoCo 4 takes the way of a string that is pulled tight from the
+polyline that leads from one end over the side site to the other: the long way only if the two legs of this polyline
+together go round the axis by more than half a turn.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.marks import stored_side_rule
 
 SIDE_RULES = MUJOCO_3, MUJOCO_4 = 3, 4
+AUTHORS = 0  # of hints that mjwrap's tuples list: the way round whose middle is nearer to the hint
 
 
 def running_side_rule() -> int:

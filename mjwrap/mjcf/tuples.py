@@ -23,7 +23,7 @@ from mjwrap.mjcf.parameters import (
     read_texts,
 )
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
-from mjwrap.mjcf.side_rules import MUJOCO_3
+from mjwrap.mjcf.side_rules import AUTHORS
 from mjwrap.mjcf.wrapping_geoms import size_keys
 
 OBJ = mujoco.mjtObj
@@ -49,7 +49,7 @@ def read_tuple(
     rest: mujoco.MjData,
     index: int,
     transmission: bool = False,
-    side_rule: int = MUJOCO_3,
+    side_rule: int = AUTHORS,
 ) -> MuscleDeclaration:
     """Return the muscle that a tuple declares; `ModelError`, which names the tuple or muscle and the element, if wrong.
 
