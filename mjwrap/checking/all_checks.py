@@ -111,7 +111,7 @@ def _derivatives(
     velocity, length = muscles.velocity, muscles.length
     around = Neighbourhood(muscles, data)
     # the length itself stands for a moment arm, so that angles and slides have one scale
-    units = np.where(turning_dofs(model), length[:, None], 1.0)
+    units = np.where(turning_dofs(model) & (length[:, None] > 0.0), length[:, None], 1.0)
     size = np.maximum((np.abs(jacobian) / units).max(axis=1, initial=0.0), LEAST)
     full = np.maximum(np.abs(jacobian) @ np.abs(data.qvel), LEAST * (units @ np.abs(data.qvel)))
     speed.see(extrapolated_error(around.central(data.qvel.copy()), velocity) / full, where, muscles.names)

@@ -15,6 +15,8 @@ from mjwrap.poses.joint_sweeps import PoseMaker, PoseSequence
 from mjwrap.poses.ties import KINK, TIE
 from mjwrap.text import counted
 
+BOTH = "the path that both have found bends"
+AS_MUCH = 1e-3  # largest difference of two jumps that are the same, as a share of their size
 SAME_PLACE = 1e-6  # largest distance of one jump from itself, as a share of the sweep's range
 
 
@@ -69,7 +71,18 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
             before, after, cause = _sides(comparer, pair, program, place, jump[0], span)
             told_as = program, pair.name, motion.name, *jump, before, after, motion.base
             found.append(Jump(*told_as, alone=motion.alone, cause="" if jump[1] else cause))
+    found = [replace(jump, cause=jump.cause or _shared(jump, found, span)) for jump in found]
     return [_with_other_smooth(jump, found, batch) for jump in found]
+
+
+def _shared(jump: Jump, found: list[Jump], span: float) -> str:
+    """Return `BOTH` if the other program's moment arm jumps there by as much, and neither length does."""
+    for other in found:
+        same_place = other.muscle == jump.muscle and abs(other.at - jump.at) < SAME_PLACE * span
+        as_much = abs(other.slope - jump.slope) <= AS_MUCH * abs(jump.slope)
+        if other.program != jump.program and same_place and as_much and not (other.length or jump.length):
+            return BOTH
+    return ""
 
 
 def _with_other_smooth(jump: Jump, found: list[Jump], batch: Batch) -> Jump:

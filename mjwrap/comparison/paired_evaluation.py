@@ -75,7 +75,8 @@ class MusclePair:
     index: in the `MuscleSystem`; status (T,): of mjwrap. A muscle that stays with MuJoCo has index -1, mjwrap None.
     size: of the muscle [m]; arms (nv,): sizes of its moment arms, the size about joints that turn and 1 along slides.
     tie (T,): the ends of a span are opposite to each other, seen from its sphere's centre, so that all ways round are
-    equally long; kink (T,): two stops coincide, so that there is no direction from one to the other.
+    equally long; kink (T,): two stops coincide, so that there is no direction from one to the other, or an end lies on
+    the surface in which a span is held.
     """
 
     name: str
@@ -221,8 +222,16 @@ class Comparer:
         tie, kink = (np.zeros(len(points[0].a), dtype=np.bool_) for _ in range(2))
         for span, at in zip(spans, points, strict=True):
             kink |= np.linalg.norm(at.b - at.a, axis=1) <= NARROW * size
-            if span.geom >= 0 and not span.inside and not _is_cylinder(self.model, span.geom):
-                tie |= opposite(geoms.local(span.geom, at.a), geoms.local(span.geom, at.b))
+            if span.geom < 0:
+                continue
+            ends = [geoms.local(span.geom, x) for x in (at.a, at.b)]
+            if span.inside:
+                flat = 2 if _is_cylinder(self.model, span.geom) else 3
+                radius = float(self.model.geom_size[span.geom, 0])
+                for end in ends:
+                    kink |= np.abs(np.linalg.norm(end[:, :flat], axis=1) - radius) <= NARROW * size
+            elif not _is_cylinder(self.model, span.geom):
+                tie |= opposite(*ends)
         return tie, kink
 
     def _record(

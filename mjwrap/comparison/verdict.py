@@ -36,7 +36,7 @@ class Outcome(enum.IntEnum):
     WRONG_SIDE = (
         7  # from a cold start mjwrap passes a cylinder not on the side that its hint means, MuJoCo does
     )
-    KINK = 8  # both are the same geodesic, but two of its stops coincide: there is no derivative there
+    KINK = 8  # both are the same geodesic, which has a kink there and no derivative
 
 
 MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED, Outcome.WRONG_SIDE)

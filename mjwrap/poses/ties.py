@@ -1,4 +1,8 @@
-"""Poses at which no path has a continuous moment arm: ties of equally long ways round a sphere, and kinks."""
+"""Poses at which no path has a continuous moment arm: ties of equally long ways round a sphere, and kinks.
+
+A string that is held inside a geom, as with MuJoCo's side site inside, has to come back to the geom as soon as one of
+its ends has left it; there is a kink.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +16,8 @@ from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.system import MuscleSystem
 
 TIE = "the line between its neighbours passes through a sphere's centre, so that all ways round are equally long"
-KINK = "two of its stops coincide"
-NEAR = (
-    1e-6  # largest angle from a tie [rad], and largest distance from a kink as a share of the muscle's size
-)
+KINK = "two of its stops coincide, or an end lies on the surface in which the string is held"
+NEAR = 1e-6  # largest angle from a tie [rad], and distance from a kink as a share of the muscle's size
 
 
 def moment_arm_break(muscles: MuscleSystem, data: mujoco.MjData, i: int, size: float) -> str:
@@ -29,9 +31,20 @@ def moment_arm_break(muscles: MuscleSystem, data: mujoco.MjData, i: int, size: f
                 swept = float(row[layout.S_ARC]) / radius + sum(math.atan(l / radius) for l in straight)
                 if not row[layout.INSIDE] and abs(swept - math.pi) <= NEAR:
                     return TIE
-    sites = muscles.poses(data).site_xpos
+    poses = muscles.poses(data)
     for route in muscles.declarations[i].routes:
-        stops = sites[[route.origin, *(n.site for n in route.nodes if n.site >= 0), route.insertion]]
-        if (np.linalg.norm(np.diff(stops, axis=0), axis=1) <= NEAR * size).any():
+        stops = [route.origin, *(n.site for n in route.nodes if n.site >= 0), route.insertion]
+        if (np.linalg.norm(np.diff(poses.site_xpos[stops], axis=0), axis=1) <= NEAR * size).any():
             return KINK
+        for node, *ends in route.geom_ends():
+            if node.inside and any(_on_surface(muscles.model, poses, node.geom, end, size) for end in ends):
+                return KINK
     return ""
+
+
+def _on_surface(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int, size: float) -> bool:
+    """Return whether a site lies on the surface of a sphere or endless cylinder geom."""
+    local = poses.geom_xmat[geom].reshape(3, 3).T @ (poses.site_xpos[site] - poses.geom_xpos[geom])
+    if int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+        local = local[:2]
+    return abs(float(np.linalg.norm(local)) - float(model.geom_size[geom, 0])) <= NEAR * size
