@@ -149,3 +149,41 @@ def test_a_jump_of_one_program_alone_has_no_excuse(monkeypatch: pytest.MonkeyPat
     bad = [jump for jump in found.jumps if not jump.cause]
     assert {(jump.program, round(jump.at, 4)) for jump in bad} == {("mjwrap", 0.1003)}
     assert told(found)[0] == "MuJoCo"
+
+
+# One load on three slides for each tendon, as in MuJoCo's own tests of wrapping; the line to load 0 hits every geom's
+# centre or axis, and the end of its slide lies on the surface.
+LOADS = """
+<mujoco>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <worldbody>{loads}</worldbody>
+  <tendon>{tendons}</tendon>
+  <actuator>{muscles}</actuator>
+</mujoco>
+"""
+LOAD = """<site name="a{n}" pos="{x} 0 1"/><geom name="g{n}" {shape} pos="{x} 0 .5"/><site name="s{n}" pos="{s} 0 .5"/>
+<body pos="{x} 0 .15"><joint name="x{n}" type="slide" axis="1 0 0" range="-.25 .25"/>
+  <joint name="y{n}" type="slide" axis="0 1 0" range="-.25 .25"/>
+  <joint name="z{n}" type="slide" axis="0 0 1" range="-.25 .25"/><geom size=".05"/><site name="b{n}"/></body>"""
+
+
+@pytest.mark.parametrize("shape", ['size=".1"', 'type="cylinder" size=".05 .2" zaxis="0 1 .2"'])
+def test_nobody_is_blamed_on_loads_hung_over_geoms(shape: str) -> None:
+    sides = {0: "", 1: 'sidesite="s1"', 2: 'sidesite="s2"'}  # none, outside, inside
+    places = {0: (0.0, 0.0), 1: (0.4, 0.52), 2: (-0.4, -0.44)}
+    text = LOADS.format(
+        loads="".join(LOAD.format(n=n, x=x, s=s, shape=shape) for n, (x, s) in places.items()),
+        tendons="".join(
+            f'<spatial name="t{n}"><site site="a{n}"/><geom geom="g{n}" {side}/><site site="b{n}"/></spatial>'
+            for n, side in sides.items()
+        ),
+        muscles="".join(f'<muscle name="m{n}" tendon="t{n}" lengthrange=".1 2" force="9"/>' for n in sides),
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    found = compare_poses(model, samples=41, bases=2)
+    assert found.at_fault == 0
+    for name, summary in found.muscles.items():
+        jumps = [jump for jump in found.jumps if jump.muscle == name]
+        assert verdict(summary, jumps).right != "MuJoCo"
+        assert all(jump.cause for jump in jumps if jump.program == "mjwrap")
+    assert check_model(model, poses=5, samples=41).failed == []

@@ -107,7 +107,7 @@ def _derivatives(
     """Compare l̇ and ∂l/∂q at a pose with differences of l; return the orders with which these converge to ∂l/∂q."""
     model = muscles.model
     jacobian = muscles.length_jacobian(data)
-    paths.record(muscles, where)
+    paths.record(muscles, data, where)
     velocity, length = muscles.velocity, muscles.length
     around = Neighbourhood(muscles, data)
     # the length itself stands for a moment arm, so that angles and slides have one scale

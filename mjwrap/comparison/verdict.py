@@ -36,7 +36,7 @@ class Outcome(enum.IntEnum):
     WRONG_SIDE = (
         7  # from a cold start mjwrap passes a cylinder not on the side that its hint means, MuJoCo does
     )
-    KINK = 8  # both are the same geodesic, which has a kink there and no derivative
+    KINK = 8  # a kink, at which the path has no derivative, or a tie, at which no way round is the shortest
 
 
 MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED, Outcome.WRONG_SIDE)
@@ -65,6 +65,7 @@ def outcomes(pair: MusclePair, motion: PoseSequence) -> NDArray[np.int64]:
         (native.fault != 0, Outcome.MUJOCO_NOT_GEODESIC),
         (mine.fault != 0, Outcome.MJWRAP_WRONG),
         ((pair.status != 0) & (native.fault == 0), Outcome.MJWRAP_FAILED),
+        ((pair.status == Status.NOT_MINIMAL) & (native.fault == 0) & pair.tie, Outcome.KINK),
         ((pair.status != 0) & (native.fault != 0), Outcome.NO_PATH),
     ):
         found[here] = outcome

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
-from mjwrap.poses.ties import KINK
+from mjwrap.poses.ties import KINK, TIE
 from mjwrap.text import counted
 
 
@@ -100,7 +100,8 @@ def _breaks(summary: MuscleSummary, jumps: Sequence[Jump]) -> list[str]:
     kinks = summary.counts[Outcome.KINK.name]
     if kinks:
         found.append(
-            f"at {counted(kinks, 'pose')} {KINK}: no moment arm exists there, and the two programs give different ones"
+            f"at {counted(kinks, 'pose')} {KINK}; or {TIE}: no moment arm exists there, and the two programs need not "
+            "give the same one"
         )
     for cause in dict.fromkeys(jump.cause for jump in jumps):
         here = [jump for jump in jumps if jump.cause == cause]

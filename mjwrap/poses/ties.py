@@ -13,6 +13,8 @@ import numpy as np
 
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.paths import Status
+from mjwrap.surfaces import Sphere
 from mjwrap.system import MuscleSystem
 
 TIE = "the line between its neighbours passes through a sphere's centre, so that all ways round are equally long"
@@ -40,6 +42,21 @@ def moment_arm_break(muscles: MuscleSystem, data: mujoco.MjData, i: int, size: f
             if node.inside and any(_on_surface(muscles.model, poses, node.geom, end, size) for end in ends):
                 return KINK
     return ""
+
+
+def lacks_minimum(muscles: MuscleSystem, data: mujoco.MjData, i: int) -> bool:
+    """Return whether muscle i has no path at the last evaluation, of data, as no way round a sphere is shortest."""
+    if muscles.status[i] != Status.NOT_MINIMAL:
+        return False
+    poses = muscles.poses(data)
+    for route in muscles.declarations[i].routes:
+        for node, *ends in route.geom_ends():
+            if isinstance(node.surface, Sphere) and not node.inside:
+                a, b = (poses.site_xpos[end] - poses.geom_xpos[node.geom] for end in ends)
+                size = float(np.linalg.norm(a) * np.linalg.norm(b))
+                if a @ b < 0.0 and float(np.linalg.norm(np.cross(a, b))) <= NEAR * size:
+                    return True
+    return False
 
 
 def _on_surface(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site: int, size: float) -> bool:

@@ -31,7 +31,7 @@ TITLES = {
     Outcome.MJWRAP_WRONG: "mjwrap wrong",
     Outcome.UNEXPLAINED: "unexplained",
     Outcome.WRONG_SIDE: "wrong side",
-    Outcome.KINK: "kink",
+    Outcome.KINK: "kink or tie",
 }
 Say = Callable[[str], object]
 
