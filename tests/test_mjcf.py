@@ -20,7 +20,6 @@ from declared_models import (
 
 import mjwrap as mw
 from mjwrap.mjcf import MuscleDeclaration, Node, Route, read_declarations
-from mjwrap.mjcf.side_rules import running_side_rule
 
 SITE, GEOM = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
 LENGTH = 1e-13  # [m] sums of a dozen terms below one metre
@@ -50,12 +49,11 @@ def test_a_native_muscle_is_a_declaration_as_it_stands() -> None:
         model, SITE, "origin", "elbow_side", "via", "middle", "ball_side", "insertion"
     )
     elbow, ball = ids(model, GEOM, "elbow", "ball")
-    rule = running_side_rule()
     nodes = (
-        Node(geom=elbow, hint_site=side, surface=mw.Cylinder(0.025), side_rule=rule),
+        Node(geom=elbow, hint_site=side, surface=mw.Cylinder(0.025)),
         Node(site=via),
         Node(site=middle),
-        Node(geom=ball, hint_site=ball_side, surface=mw.Sphere(0.015), side_rule=rule),
+        Node(geom=ball, hint_site=ball_side, surface=mw.Sphere(0.015)),
     )
     assert muscle.routes == (Route(origin, nodes, insertion),)
     assert (muscle.name, muscle.law, muscle.actuator, muscle.tendon) == ("extensor", "mujoco", 0, 0)

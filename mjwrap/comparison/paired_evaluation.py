@@ -20,10 +20,8 @@ from mjwrap.comparison.judge_geodesic import (
     judge_held,
     opposite,
 )
-from mjwrap.comparison.side_turns import turn_by_rule
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
 from mjwrap.mjcf.inside import reference_pose
-from mjwrap.mjcf.side_rules import AUTHORS
 from mjwrap.poses.continuation import PathFollower, SweepTrace
 from mjwrap.poses.joint_sweeps import PoseSequence
 from mjwrap.poses.sizes import route_size, turning_dofs
@@ -34,6 +32,7 @@ Ints = NDArray[np.int64]
 LENGTH = (
     3e-9  # largest difference of a path's length from the sum of its parts, as a share of the muscle's size
 )
+TURN = 2.0 * np.pi
 NARROW = 1e-6  # the same of two points that coincide, so that rounding chooses the direction between them
 
 
@@ -140,7 +139,7 @@ class Comparer:
                 return "it has no tendon in MuJoCo"
             own = muscle_spans(declared)
             spans = tendon_spans(model, self._native_data, declared.tendon)
-            if own is None or [span._replace(side_rule=AUTHORS) for span in own] != spans:
+            if own is None or [span._replace(turn=0.0) for span in own] != spans:
                 return "its tendon is a placeholder: mjwrap's route is different"
             return self._sized(name, index, declared.tendon, own)
         actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
@@ -255,9 +254,12 @@ class Comparer:
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
                 if span.hint >= 0 and not span.inside:
                     side = geoms.local(span.geom, geoms.sites[:, span.hint])
-                    if span.side_rule != AUTHORS and local[0]:
-                        meant = turn_by_rule(span.side_rule, local[1], local[2], local[3], side)
-                        hinted[:, s] = np.abs(meant - found.turn) < SAME_TURN
+                    if span.turn:
+                        near = np.abs(span.turn - found.turn) < np.pi + SAME_TURN
+                        most = np.abs(found.turn + TURN * np.round((span.turn - found.turn) / TURN))
+                        hinted[:, s] = near | (
+                            most > TURN
+                        )  # more than one turn is followed in small steps only
                     else:
                         hinted[:, s] = np.einsum("ti,ti->t", found.middle[:, :2], side[:, :2]) > 0.0
                 new = (found.fault > 0) & (fault == 0)

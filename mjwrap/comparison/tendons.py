@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.mjcf import MuscleDeclaration, Node, tendon_stops
-from mjwrap.mjcf.side_rules import AUTHORS
 
 Array = NDArray[np.float64]
 _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
@@ -19,7 +18,7 @@ _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
 class Span(NamedTuple):
     """A part of a tendon from one site to the next, over a geom (-1: none); weight: its factor in the length (pulleys).
 
-    inside: whether it must meet the geom's solid. side_rule: the rule of its side site (`mjcf/side_rules.py`).
+    inside: whether it must meet the geom's solid. turn: as for `mjcf.Node`, for mjwrap's paths.
     """
 
     start: int
@@ -28,13 +27,11 @@ class Span(NamedTuple):
     hint: int
     weight: float
     inside: bool = False
-    side_rule: int = AUTHORS
+    turn: float = 0.0
 
 
-def tendon_spans(
-    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = AUTHORS
-) -> list[Span]:
-    """Return the spans of a spatial tendon in order. poses: any, with kinematics. side_rule: of its side sites."""
+def tendon_spans(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Span]:
+    """Return the spans of a spatial tendon in order. poses: any, with kinematics."""
     spans: list[Span] = []
     last, geom, hint, weight, inside = -1, -1, -1, 1.0, False
     for stop in tendon_stops(model, poses, tendon):
@@ -46,7 +43,7 @@ def tendon_spans(
             hint = stop.index
         else:
             if last >= 0:
-                spans.append(Span(last, stop.index, geom, hint, weight, inside, side_rule))
+                spans.append(Span(last, stop.index, geom, hint, weight, inside))
             last, geom, hint, inside = stop.index, -1, -1, False
     return spans
 
@@ -59,9 +56,7 @@ def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
         for node in (*route.nodes, Node(site=route.insertion)):
             if node.geom < 0:
                 spans.append(
-                    Span(
-                        last, node.site, over.geom, over.hint_site, route.weight, over.inside, over.side_rule
-                    )
+                    Span(last, node.site, over.geom, over.hint_site, route.weight, over.inside, over.turn)
                 )
                 last, over = node.site, Node()
             elif over.geom < 0:

@@ -82,9 +82,8 @@ def _other_ways(summary: MuscleSummary) -> list[str]:
         )
     if cold:
         found.append(
-            f"at {cold} of {summary.poses} poses {told}, although mjwrap chooses the side anew there, too: the side "
-            "site, or the muscle's own hint, means another way to mjwrap's rule (side_rule) than to this MuJoCo's, or "
-            "both ways are equally good by the rule"
+            f"at {cold} of {summary.poses} random poses {told}: MuJoCo chooses the side anew at every pose; mjwrap "
+            "starts on the side to which its rule for side sites (side_rule), or its own hint, leads"
         )
     return found
 
@@ -136,7 +135,8 @@ def _own_faults(summary: MuscleSummary) -> str:
     sides = summary.counts[Outcome.WRONG_SIDE.name]
     if sides:
         told.append(
-            f"at {counted(sides, 'pose')} mjwrap starts on the side of the cylinder that its side site does not mean"
+            f"at {counted(sides, 'pose')} mjwrap does not start on the side to which its side site leads at the "
+            "reference pose"
         )
     for words, count in summary.own_faults.most_common(3):
         told.append(f"mjwrap's path is not a geodesic at {counted(count, 'pose')}: {words}")

@@ -15,7 +15,7 @@ this order:
     S_... (11)  the saved solution: all that a warm start needs
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
     HANDLE      address of further data of the surface, 0 where there are none
-    HINT_RULE   how the hint picks the way round a cylinder, as listed below
+    HINT_TURN   angle swept about a cylinder's axis near which a hinted string starts, 0 where the hint itself decides
 
 The columns KIND to Z_LIMIT, which are read most often, fill the row's first cache line.
 
@@ -65,13 +65,6 @@ ELLIPSE_SECTIONS = 32  # an ellipsoid with semi-axes DIM, so that plane sections
 # ------------------------------------- values of INSIDE: the solid inside which a string is held; 0: none
 ABOUT_POINT = 1.0  # a sphere
 ABOUT_AXIS = 2.0  # a cylinder about z
-
-# ------------------------------------------------ values of HINT_RULE: the way round a cylinder that a hint means
-NEAREST_MIDDLE = 0.0  # the one whose middle is nearer to the hint
-NEAREST_CHORD = 1.0  # the one the middle of whose chord is nearer to the hint: the rule of MuJoCo 3
-POLYLINE = (
-    2.0  # that of a string that is pulled tight from the polyline through the hint: the rule of MuJoCo 4
-)
 
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0
@@ -135,7 +128,7 @@ W_END_TARGET = 155  # 1 while Newton's method moves Q to an end on the surface f
 INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS if a string between two fixed points is held inside the solid
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
-HINT_RULE = 159
+HINT_TURN = 159
 ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`

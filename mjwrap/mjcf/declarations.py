@@ -13,9 +13,9 @@ from mjwrap.surfaces import Surface
 class Node:
     """One stop of a route: a via site, or a surface in a geom's frame, which may have a site as hint.
 
-    inside: the string must meet the solid, as with a side site inside, and is not kept out of it.
-    sizes: the numeric that gives the surface's sizes, -1 if the geom gives them. side_rule: the rule by which the hint
-    picks the way round a cylinder (`side_rules.py`); 0 for hints that mjwrap's own tuples list.
+    inside: the string must meet the solid, as with a side site inside, and is not kept out of it. sizes: the numeric
+    that gives the surface's sizes, -1 if the geom gives them. turn: if a tendon's side site picks the way round a
+    cylinder, the angle by which the string goes round at the reference pose (`side_rules.py`), else 0.
     """
 
     site: int = -1
@@ -24,7 +24,7 @@ class Node:
     surface: Surface | None = None
     inside: bool = False
     sizes: int = -1
-    side_rule: int = 0
+    turn: float = field(default=0.0, compare=False)
 
 
 @dataclass(frozen=True)

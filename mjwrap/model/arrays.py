@@ -14,17 +14,11 @@ from mjwrap.kernels.coupling.groups import Routes
 from mjwrap.kernels.musculotendon import dispatch, dynamics
 from mjwrap.kernels.musculotendon.groups import Muscles
 from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
-from mjwrap.mjcf.side_rules import AUTHORS, MUJOCO_3, MUJOCO_4
 from mjwrap.muscles.laws import ActuatorForce, parameter_row
 from mjwrap.surfaces.rows import surface_rows
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-HINT_RULES = {
-    AUTHORS: layout.NEAREST_MIDDLE,
-    MUJOCO_3: layout.NEAREST_CHORD,
-    MUJOCO_4: layout.POLYLINE,
-}
 
 
 @dataclass(frozen=True)
@@ -102,7 +96,7 @@ def kernel_rows(node: Node) -> list[Array]:
     """Return the kernels' rows of a stop, for a cold start; several if a string may touch its surface several times."""
     if node.surface is not None:
         rows = surface_rows(node.surface, node.inside)
-        rows[:, layout.HINT_RULE] = HINT_RULES[node.side_rule]
+        rows[:, layout.HINT_TURN] = node.turn
         return list(rows)
     row = np.zeros(layout.ROW)
     row[layout.KIND], row[layout.S_MODE] = layout.VIA, layout.COLD

@@ -51,9 +51,9 @@ def install(
             act by wrenches.
         keep_tendons: let MuJoCo also compute tendons that only declare the route of a muscle; by default the returned
             model leaves them out.
-        side_rule: the rule by which the side site of a tendon picks the way round a cylinder: 3 for MuJoCo 3's, 4 for
-            MuJoCo 4's. None: the rule of an earlier install of this spec, else that of the running MuJoCo. The model
-            keeps it, also when it is saved and opened with another MuJoCo.
+        side_rule: whose rule picks, at the reference pose, the way round a cylinder that the side site of a tendon
+            means: 3 for MuJoCo 3's, 4 for MuJoCo 4's. None: the rule of an earlier install of this spec, else that of
+            the running MuJoCo. The model keeps it, also when it is saved and opened with another MuJoCo.
 
     Returns:
         The compiled model.

@@ -122,8 +122,13 @@ class Evaluator(Results):
             self._groups_off = off
 
     def _failed(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
-        """Note which muscles have no path; raise `PathError` if `strict` was given."""
+        """Note which muscles have no path, and what acts instead; raise `PathError` if `strict` was given."""
         bad = np.flatnonzero(state.status)
+        held = self.held
+        if held.any():
+            state.any_held = True
+            state.kept_now |= held & (state.length > 0.0)
+            state.forceless_now |= held & (state.length == 0.0)
         for i in bad:
             if state.last_failure[i] != state.status[i]:
                 inside = state.status[i] == Status.ENDPOINT_INSIDE

@@ -36,7 +36,7 @@ def add_side_rule(parser: Any) -> None:
         type=int,
         choices=(3, 4),
         metavar="3|4",
-        help="rule by which the side site of a tendon picks the way round a cylinder where a path of mjwrap begins: "
+        help="whose rule picks, at the reference pose, the way round a cylinder that the side site of a tendon means: "
         "that of MuJoCo 3 or 4 (default: the running MuJoCo's, or the one that an installed model has stored)",
     )
 

@@ -54,18 +54,6 @@ def _cross_each_other(ax, ay, px, py, bx, by, qx, qy):
 
 
 @jit
-def _passes_beside(ax, ay, bx, by, hint_x, hint_y, radius):
-    """Return whether the straight string passes the cylinder on the hint's side; true for a hint on the axis."""
-    if math.sqrt(hint_x * hint_x + hint_y * hint_y) < 1e-9 * radius:
-        return True
-    dx, dy = bx - ax, by - ay
-    square = dx * dx + dy * dy
-    share = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
-    cx, cy = ax + share * dx, ay + share * dy
-    return cx * cx + cy * cy > radius * radius and cx * hint_x + cy * hint_y >= 0.0
-
-
-@jit
 def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
     """Return the swept angle for a path that passes a cylinder on the hint's side, at a cold start.
 
@@ -73,11 +61,18 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
     straight. Otherwise the way round whose middle is nearer to the hint is taken, also if it is the longer one, unless
     it crosses itself.
     """
-    if _passes_beside(ax, ay, bx, by, hint_x, hint_y, radius):
+    size = math.sqrt(hint_x * hint_x + hint_y * hint_y)
+    if size < 1e-9 * radius:
+        return principal
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    share = min(max(-(ax * dx + ay * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    cx, cy = ax + share * dx, ay + share * dy
+    if cx * cx + cy * cy > radius * radius and cx * hint_x + cy * hint_y >= 0.0:
         return principal
     turn = 1.0 if principal >= 0.0 else -1.0
     # the middle of the arc, as an angle about the axis: the shorter way round, then the other one
-    start = math.atan2(ay, ax)
+    start, end = math.atan2(ay, ax), math.atan2(by, bx)
     middle = start + 0.5 * (principal + turn * (alpha_a - alpha_b))
     towards = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     other = principal - turn * TWO_PI
@@ -85,65 +80,12 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
     away = math.cos(middle) * hint_x + math.sin(middle) * hint_y
     if towards >= away:
         return principal
-    return _other_way(ax, ay, bx, by, principal, alpha_a, alpha_b, radius)
-
-
-@jit
-def _chord(ax, ay, bx, by, turn, alpha_a, alpha_b, radius):
-    """Return the middle of the chord between the contact points of the way round with this turn, and if it crosses."""
-    start = math.atan2(ay, ax) + turn * alpha_a
-    end = math.atan2(by, bx) - turn * alpha_b
+    # contact points of the other way, which is not taken if its straight segments cross
+    start -= turn * alpha_a
+    end += turn * alpha_b
     px, py = radius * math.cos(start), radius * math.sin(start)
     qx, qy = radius * math.cos(end), radius * math.sin(end)
-    crossing = _cross_each_other(ax, ay, px, py, bx, by, qx, qy)
-    return 0.5 * (px + qx), 0.5 * (py + qy), crossing
-
-
-@jit
-def _other_way(ax, ay, bx, by, principal, alpha_a, alpha_b, radius):
-    """Return the swept angle of the longer way round, or of the shorter one if the longer one crosses itself."""
-    turn = -1.0 if principal >= 0.0 else 1.0
-    crossing = _chord(ax, ay, bx, by, turn, alpha_a, alpha_b, radius)[2]
-    return principal if crossing else principal + turn * TWO_PI
-
-
-@jit
-def _nearest_chord_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
-    """Return the swept angle by MuJoCo 3's rule for side sites (`mju_wrap` in engine_util_misc.c), at a cold start.
-
-    Where the straight string does not enter the cylinder and its point nearest to the axis lies on the hint's side, it
-    stays straight. Otherwise the middles of the chords between the contact points are compared: of the ways round that
-    do not cross themselves, the one is taken whose middle is in a direction nearer to that of the hint. On more than
-    half a turn it is opposite to the middle of the arc.
-    """
-    if _passes_beside(ax, ay, bx, by, hint_x, hint_y, radius):
-        return principal
-    turn = 1.0 if principal >= 0.0 else -1.0
-    x, y, crossing = _chord(ax, ay, bx, by, turn, alpha_a, alpha_b, radius)
-    towards = -math.inf if crossing else (x * hint_x + y * hint_y) / max(math.sqrt(x * x + y * y), 1e-300)
-    x, y, crossing = _chord(ax, ay, bx, by, -turn, alpha_a, alpha_b, radius)
-    away = -math.inf if crossing else (x * hint_x + y * hint_y) / max(math.sqrt(x * x + y * y), 1e-300)
-    if away > towards:
-        return principal - turn * TWO_PI
-    # the shorter way does not touch, and its contact points have passed each other: the string goes round once more
-    passed = abs(principal) < alpha_a + alpha_b and towards > -math.inf
-    return principal + turn * TWO_PI if passed else principal
-
-
-@jit
-def _polyline_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius):
-    """Return the swept angle by MuJoCo 4's rule for side sites, at a cold start: pulled tight from A, hint, B.
-
-    Seen along the axis, each leg of this polyline goes round the axis by less than half a turn. The longer way round is
-    taken only if both legs together do so, and if it does not cross itself.
-    """
-    if math.sqrt(hint_x * hint_x + hint_y * hint_y) < 1e-9 * radius:
-        return principal
-    first = math.atan2(ax * hint_y - ay * hint_x, ax * hint_x + ay * hint_y)
-    second = math.atan2(hint_x * by - hint_y * bx, hint_x * bx + hint_y * by)
-    if abs(first + second - principal) < math.pi:
-        return principal
-    return _other_way(ax, ay, bx, by, principal, alpha_a, alpha_b, radius)
+    return principal if _cross_each_other(ax, ay, px, py, bx, by, qx, qy) else other
 
 
 @jit
@@ -182,10 +124,8 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     if _hinted(k, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
-        if node[k, lay.HINT_RULE] == lay.POLYLINE:
-            sweep = _polyline_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
-        elif node[k, lay.HINT_RULE] == lay.NEAREST_CHORD:
-            sweep = _nearest_chord_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+        if node[k, lay.HINT_TURN] != 0.0:
+            sweep = unwrap_angle(sweep, node[k, lay.HINT_TURN])
         else:
             sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
     # angle of the arc: the swept angle minus the angles of the straight tangents
