@@ -31,15 +31,21 @@ _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 class MuscleSystem(Evaluator):
     """Drive every muscle that a model declares along its geodesic path.
 
-    model: an `MjModel`. Muscle actuators that mjwrap takes over keep their activation dynamics but no longer pull:
-    their `actuator_forcerange` is zero until `release`. strict: raise `PathError` if a path cannot be found; otherwise
-    its length is continued from the surface, or its last valid force is kept (`held`). side_rule: whose rule picks, at
-    the model's reference pose, the way round a cylinder that the side site of a tendon means: 3 for MuJoCo 3's, 4 for
-    MuJoCo 4's; None for the running MuJoCo's, or for that of the `install` before `without_plugin`. Paths that start at
-    other poses, or after `reset`, go round as if they had come from the reference pose. Raises `ModelError` if a
-    declaration is wrong. The results `length`, `velocity`, `tension`, `activation` and `status`, each (n,), are those
-    of the last `forward`, `apply` or `step`, at the state at which the forces acted. SI units; lengthening and tension
-    are positive.
+    The results `length`, `velocity`, `tension`, `activation` and `status`, each (n,), are those of the last `forward`,
+    `apply` or `step`, at the state at which the forces acted. SI units; lengthening and tension are positive.
+
+    Args:
+        model: an `MjModel`. Muscle actuators that mjwrap takes over keep their activation dynamics but no longer pull:
+            their `actuator_forcerange` is zero until `release`.
+        strict: raise `PathError` if a path cannot be found; otherwise its length is continued from the surface, or its
+            last valid force is kept (`held`).
+        side_rule: whose rule picks, at the model's reference pose, the way round a cylinder that the side site of a
+            tendon means: 3 for MuJoCo 3's, 4 for MuJoCo 4's; None for the running MuJoCo's, or for that of the
+            `install` before `without_plugin`. Paths that start at other poses, or after `reset`, go round as if they
+            had come from the reference pose.
+
+    Raises:
+        ModelError: a declaration is wrong, or there is no such rule.
     """
 
     def forward(self, data: mujoco.MjData) -> None:
