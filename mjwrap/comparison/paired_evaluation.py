@@ -20,6 +20,14 @@ from mjwrap.comparison.judge_geodesic import (
     judge_held,
     opposite,
 )
+from mjwrap.comparison.motion_records import (
+    Frames,
+    Numbers,
+    assign_contacts,
+    in_frame,
+    is_cylinder,
+    own_points,
+)
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.poses.continuation import PathFollower, SweepTrace
@@ -158,10 +166,10 @@ class Comparer:
     def evaluate(self, motion: PoseSequence, start: Array | None = None) -> Batch:
         """Evaluate all poses of a motion; start (nq,): pose from which a continuous motion takes its branches."""
         count, nv = len(motion.at), self.model.nv
-        native, mine = _Numbers(count, self.model.ntendon, nv), _Numbers(count, self.muscles.n, nv)
+        native, mine = Numbers(count, self.model.ntendon, nv), Numbers(count, self.muscles.n, nv)
         wraps = WrapRecord(self.model, count)
         contacts: list[dict[int, Array]] = []
-        geoms = _Frames(count, self.model)
+        geoms = Frames(count, self.model)
         taken = [muscle.index for muscle in self._selected if muscle.index >= 0]
         branches: list[Array] = []
         self.muscles.reset(self.data)
@@ -183,8 +191,8 @@ class Comparer:
             record = self._record(spans, points, geoms, INSIDE_TOLERANCE, size, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)
             if index >= 0:
-                own = [_own_points(at) for at in points]
-                _assign(spans, own, [contact[index] for contact in contacts], self.model, geoms)
+                own = [own_points(at) for at in points]
+                assign_contacts(spans, own, [contact[index] for contact in contacts], self.model, geoms)
                 own_record, status = (
                     self._record(spans, own, geoms, ANGLE, size, *mine.of(index)),
                     mine.status[:, index],
@@ -215,7 +223,7 @@ class Comparer:
         return muscles.length.copy(), muscles.velocity.copy(), jacobian, muscles.status.copy()
 
     def _degenerate(
-        self, spans: list[Span], points: list[SpanPoints], geoms: _Frames, size: float
+        self, spans: list[Span], points: list[SpanPoints], geoms: Frames, size: float
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return at which poses (T,) a muscle has a tie, and a kink: see `MusclePair`."""
         tie, kink = (np.zeros(len(points[0].a), dtype=np.bool_) for _ in range(2))
@@ -225,16 +233,16 @@ class Comparer:
                 continue
             ends = [geoms.local(span.geom, x) for x in (at.a, at.b)]
             if span.inside:
-                flat = 2 if _is_cylinder(self.model, span.geom) else 3
+                flat = 2 if is_cylinder(self.model, span.geom) else 3
                 radius = float(self.model.geom_size[span.geom, 0])
                 for end in ends:
                     kink |= np.abs(np.linalg.norm(end[:, :flat], axis=1) - radius) <= NARROW * size
-            elif not _is_cylinder(self.model, span.geom):
+            elif not is_cylinder(self.model, span.geom):
                 tie |= opposite(*ends)
         return tie, kink
 
     def _record(
-        self, spans: list[Span], points: list[SpanPoints], geoms: _Frames, angle: float, size: float,
+        self, spans: list[Span], points: list[SpanPoints], geoms: Frames, angle: float, size: float,
         length: Array, velocity: Array, jacobian: Array,
     ) -> PathRecord:  # fmt: skip
         count = len(length)
@@ -249,7 +257,7 @@ class Comparer:
             )
             arc = np.zeros(count)
             if span.geom >= 0:
-                local = _in_frame(self.model, span.geom, geoms, at)
+                local = in_frame(self.model, span.geom, geoms, at)
                 found = judge_held(*local, angle) if span.inside else judge(*local)
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
                 if span.hint >= 0 and not span.inside:
@@ -272,96 +280,7 @@ class Comparer:
         return PathRecord(length, velocity, jacobian, fault, measure, worst, turns, touched, hinted)
 
 
-class _Frames:
-    """The poses of geoms and sites over `count` poses: centre (T, ngeom, 3), rotation (T, ngeom, 3, 3), sites."""
-
-    def __init__(self, count: int, model: mujoco.MjModel) -> None:
-        self.centre, self.rotation = np.zeros((count, model.ngeom, 3)), np.zeros((count, model.ngeom, 3, 3))
-        self.sites = np.zeros((count, model.nsite, 3))
-
-    def keep(self, k: int, data: mujoco.MjData) -> None:
-        """Store pose k."""
-        self.centre[k], self.rotation[k] = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
-        self.sites[k] = data.site_xpos
-
-    def local(self, geom: int, points: Array) -> Array:
-        """Return world points (T, 3) in a geom's frame."""
-        return np.einsum("tji,tj->ti", self.rotation[:, geom], points - self.centre[:, geom])
-
-
-class _Numbers:
-    """Lengths, velocities, jacobians and status of `n` paths over `count` poses."""
-
-    def __init__(self, count: int, n: int, nv: int) -> None:
-        self.length, self.velocity = np.zeros((count, n)), np.zeros((count, n))
-        self.jacobian, self.status = np.zeros((count, n, nv)), np.zeros((count, n), dtype=np.int64)
-
-    def keep(self, k: int, length: Array, velocity: Array, jacobian: Array, status: Ints | int = 0) -> None:
-        self.length[k], self.velocity[k], self.jacobian[k], self.status[k] = (
-            length,
-            velocity,
-            jacobian,
-            status,
-        )
-
-    def of(self, i: int) -> tuple[Array, Array, Array]:
-        return self.length[:, i], self.velocity[:, i], self.jacobian[:, i]
-
-
 def _sparse(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.int32], ...]:
     """Return row counts, row starts and columns of ten_J; in newer MuJoCo they are in the model."""
     home = model if hasattr(model, "ten_J_rownnz") else data
     return home.ten_J_rownnz, home.ten_J_rowadr, home.ten_J_colind.reshape(-1)
-
-
-def _in_frame(
-    model: mujoco.MjModel, geom: int, geoms: _Frames, at: SpanPoints
-) -> tuple[bool, float, Array, Array, NDArray[np.bool_], Array, Array]:
-    """Return the arguments of `judge`: kind, radius, and the points in the geom's frame."""
-    a, b, p, q = (geoms.local(geom, x) for x in (at.a, at.b, at.p, at.q))
-    return _is_cylinder(model, geom), float(model.geom_size[geom, 0]), a, b, at.touched, p, q
-
-
-def _is_cylinder(model: mujoco.MjModel, geom: int) -> bool:
-    return int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-
-
-def _own_points(native: SpanPoints) -> SpanPoints:
-    """Return a span of mjwrap's path with the same end points and no contact yet."""
-    own = SpanPoints.empty(len(native.a))
-    own.a, own.b = native.a, native.b
-    return own
-
-
-def _assign(
-    spans: list[Span],
-    own: list[SpanPoints],
-    pairs: list[Array],
-    model: mujoco.MjModel,
-    geoms: _Frames,
-) -> None:
-    """Assign every contact pair (k, 2, 3) of mjwrap to the span that it fits best, in order."""
-    for t, contacts in enumerate(pairs):
-        free = [s for s, span in enumerate(spans) if span.geom >= 0]
-        for pair in contacts:
-            s = min(free, key=lambda s: _misfit(spans[s], own[s], pair, model, geoms, t))
-            own[s].touched[t], own[s].p[t], own[s].q[t] = True, pair[0], pair[1]
-            free = [f for f in free if f > s]
-
-
-def _misfit(span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geoms: _Frames, t: int) -> float:
-    """Return the distance of two contact points from a span's surface and tangents [m]."""
-    rotation, centre, radius = (
-        geoms.rotation[t, span.geom],
-        geoms.centre[t, span.geom],
-        float(model.geom_size[span.geom, 0]),
-    )
-    misfit = 0.0
-    for point, end in ((pair[0], at.a[t]), (pair[1], at.b[t])):
-        local, away = rotation.T @ (point - centre), rotation.T @ (end - point)
-        if _is_cylinder(model, span.geom):
-            local[2] = 0.0
-        distance = float(np.linalg.norm(local))
-        corner = 0.0 if span.inside else abs(float(local @ away)) / max(distance, 1e-300)
-        misfit = max(misfit, abs(distance - radius), corner)
-    return misfit
