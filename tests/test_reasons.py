@@ -130,4 +130,52 @@ def test_a_comparison_says_what_acted_where_there_was_no_path() -> None:
     assert 0 < held < failed
     (line,) = motion.paths.splitlines()
     assert line.startswith(f"m3: {failed} steps without a path")
-    assert line.endswith(f"; its last valid force was kept at {held} steps, else its length was continued")
+    continued = f"its length was continued from the surface at {failed - held} steps"
+    assert line.endswith(f"; its last valid force was kept at {held} steps, {continued}")
+
+
+# A load that moves into the ball over which its string runs, deeper than half the radius.
+DIVING = """
+<mujoco>
+  <option gravity="0 0 0" timestep="{step}" integrator="{integrator}"/>
+  <worldbody>
+    <geom name="ball" type="sphere" size=".1" contype="0" conaffinity="0"/><site name="a" pos="-.3 .02 .1"/>
+    <body name="load" pos=".2 0 .02"><joint name="x" type="slide" axis="1 0 0"/>
+      <geom size=".02" mass="1" contype="0" conaffinity="0"/><site name="b"/></body>
+  </worldbody>
+  <tendon><spatial name="t"><site site="a"/><geom geom="ball"/><site site="b"/></spatial></tendon>
+  <actuator><muscle name="m" tendon="t" lengthrange=".2 .6" force="10"/></actuator>
+  <keyframe><key name="out" qvel="-2"/><key name="in" qpos="-.19" qvel="1"/></keyframe>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+@pytest.mark.parametrize("key", ["out", "in"])
+def test_what_acted_is_counted_at_every_stage(
+    integrator: str, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step counts as held if a stage of it was; before its first path a muscle has no force to keep."""
+    model = mujoco.MjModel.from_xml_string(DIVING.format(step=0.004, integrator=integrator))
+    stages: list[tuple[bool, bool, bool]] = []
+    sound = mw.MuscleSystem._act
+
+    def act(self: mw.MuscleSystem, *given: object, **named: object) -> None:
+        sound(self, *given, **named)  # pyright: ignore[reportArgumentType]
+        held = bool(self.held[0])
+        stages.append((bool(self.status[0]), held and self.tension[0] > 0.0, held and self.length[0] == 0.0))
+
+    monkeypatch.setattr(mw.MuscleSystem, "_act", act)
+    motion = compare_motion(model, ["constant:1"], 0.12, key=model.key(key).id)
+    each = 4 if integrator == "RK4" else 1
+    steps = np.array(stages).reshape(-1, each, 3).any(axis=1)
+    failed, kept, forceless = (int(x) for x in steps.sum(axis=0))
+    assert failed > 0
+    assert (kept > 0, forceless > 0) == (key == "out", key == "in")
+    (line,) = motion.paths.splitlines()
+    assert line.startswith(f"m: {failed} steps without a path; last reason:")
+    words = ("its last valid force was kept", "it had no force, because it had had no path before")
+    for count, what in zip((kept, forceless), words, strict=True):
+        assert (what in line) == (count > 0)
+        if 0 < count < failed:
+            assert f"{what} at {count} step" in line

@@ -16,7 +16,9 @@ _PLACEHOLDER = (
 )  # until the ranges are known: the compiler and MuJoCo's muscle need an increasing one
 
 
-def set_length_ranges(spec: mujoco.MjSpec, **options: Any) -> dict[str, LengthRange]:
+def set_length_ranges(
+    spec: mujoco.MjSpec, *, side_rule: int | None = None, **options: Any
+) -> dict[str, LengthRange]:
     """Write length ranges along mjwrap's paths into the muscle actuators of an MjSpec that have none.
 
     MuJoCo's compiler finds missing ranges by a simulation along its own tendons. It does not converge if a tendon
@@ -24,6 +26,7 @@ def set_length_ranges(spec: mujoco.MjSpec, **options: Any) -> dict[str, LengthRa
 
     Args:
         spec: the model; `lengthrange` of its actuators is changed.
+        side_rule: as for `MuscleSystem`.
         options: arguments of `length_ranges`, such as `ranges`, `base` or `seed`.
 
     Returns:
@@ -47,7 +50,7 @@ def set_length_ranges(spec: mujoco.MjSpec, **options: Any) -> dict[str, LengthRa
         spec.compiler.LRopt.mode = int(mujoco.mjtLRMode.mjLRMODE_NONE)
         for element in missing:
             element.lengthrange = _PLACEHOLDER
-        muscles = MuscleSystem(spec.compile())
+        muscles = MuscleSystem(spec.compile(), side_rule=side_rule)
         names = [element.name for element in missing]
         for name in names:
             if name not in muscles.names:

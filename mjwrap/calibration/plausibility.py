@@ -184,7 +184,7 @@ def _passive_tension(muscles: MuscleSystem, rest: ArrayLike | None) -> NDArray[n
         if given.shape != (model.nq,):
             raise StateError(f"the rest pose must have shape ({model.nq},), not {given.shape}")
         data.qpos[:] = given
-    own = MuscleSystem(model)
+    own = MuscleSystem(model, side_rule=muscles.side_rule)
     own.forward(data)
     tension = np.full(own.n, np.nan)
     for i in np.flatnonzero(own.status == 0):

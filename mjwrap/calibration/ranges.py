@@ -159,7 +159,7 @@ def length_ranges(
     chosen = [i for i, name in enumerate(muscles.names) if names is None or name in names]
     space = JointSpace(model, model.qpos0 if base is None else base, ranges or {})
     moved, held = space.moves(muscles.declarations)
-    lengths = _Lengths(MuscleSystem(model), space)
+    lengths = _Lengths(MuscleSystem(model, side_rule=muscles.side_rule), space)
     searches = _starts(lengths, chosen, moved, starts, samples, np.random.default_rng(seed))
     _climb(lengths, searches)
     found = {}

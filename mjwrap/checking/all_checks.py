@@ -16,9 +16,11 @@ from mjwrap.checking.sweeps import Paths, Sweeper
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import dof_names
 from mjwrap.poses.joint_sweeps import PoseMaker
+from mjwrap.poses.sizes import turning_dofs
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
+LEAST = 1e-3  # smallest moment arm to which errors are relative, as a share of the length; 1 along slides
 Progress = Callable[[str, int, int], object]
 
 
@@ -29,11 +31,13 @@ def check_model(
     samples: int = 101,
     base: Array | None = None,
     seed: int = 0,
+    side_rule: int | None = None,
     progress: Progress | None = None,
 ) -> Checks:
     """Check the paths, derivatives, forces, continuity and energy of a model's muscles.
 
-    The limits are the same for every model.
+    The limits are the same for every model, and relative to its own sizes: a model in millimetres passes like its twin
+    in metres.
 
     Args:
         model: the model; it is not changed.
@@ -42,6 +46,7 @@ def check_model(
             that are coupled to the swept one follow.
         base: (nq,) base pose; qpos0 if None.
         seed: seed of the random poses.
+        side_rule: as for `MuscleSystem`.
         progress: called with (name, number done, total number).
 
     Returns:
@@ -50,7 +55,7 @@ def check_model(
     Raises:
         ModelError: the model has no muscles.
     """
-    muscles, data = MuscleSystem(model), mujoco.MjData(model)
+    muscles, data = MuscleSystem(model, side_rule=side_rule), mujoco.MjData(model)
     if not muscles.n:
         raise ModelError("the model has no muscles with geodesic paths: nothing to check")
     start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
@@ -89,7 +94,7 @@ def check_model(
         tell("sweeps", poses + k, total)
         sweeper.sweep(each, joint, axis, samples)
     tell("energy", total - 1, total)
-    energy = check_energy(model, maker.base)
+    energy = check_energy(model, maker.base, side_rule)
     coupled = len(maker.joints()) - len(free)
     facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples,
              "joints_that_follow": coupled}  # fmt: skip
@@ -102,16 +107,18 @@ def _derivatives(
     """Compare l̇ and ∂l/∂q at a pose with differences of l; return the orders with which these converge to ∂l/∂q."""
     model = muscles.model
     jacobian = muscles.length_jacobian(data)
-    paths.record(muscles, where)
+    paths.record(muscles, data, where)
     velocity, length = muscles.velocity, muscles.length
     around = Neighbourhood(muscles, data)
-    size = np.maximum(np.abs(jacobian).max(axis=1, initial=0.0), 1e-3 * length)
-    full = np.maximum(np.abs(jacobian) @ np.abs(data.qvel), 1e-3 * length)
+    # the length itself stands for a moment arm, so that angles and slides have one scale
+    units = np.where(turning_dofs(model) & (length[:, None] > 0.0), length[:, None], 1.0)
+    size = np.maximum((np.abs(jacobian) / units).max(axis=1, initial=0.0), LEAST)
+    full = np.maximum(np.abs(jacobian) @ np.abs(data.qvel), LEAST * (units @ np.abs(data.qvel)))
     speed.see(extrapolated_error(around.central(data.qvel.copy()), velocity) / full, where, muscles.names)
     found = []
     for d, dof in enumerate(dof_names(model)):
         central = around.central(np.eye(model.nv)[d])
-        error = extrapolated_error(central, jacobian[:, d]) / size
-        arms.see(error, f"{dof}, {where}", muscles.names)
-        found.append(orders(central, jacobian[:, d], size))
+        scale = size * units[:, d]
+        arms.see(extrapolated_error(central, jacobian[:, d]) / scale, f"{dof}, {where}", muscles.names)
+        found.append(orders(central, jacobian[:, d], scale))
     return np.concatenate([np.empty(0), *found])

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.poses.sizes import turning_dofs
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -16,7 +17,6 @@ ENOUGH = (
     2.0**-6
 )  # shortest piece of a path, as a share of the muscles' lengths, for which WIDTHS are narrow enough
 MOST_FURTHER = 8  # narrower widths; rounding dominates beyond them
-_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 class Neighbourhood:
@@ -29,8 +29,7 @@ class Neighbourhood:
         self._branch = muscles.branch(data)
         self._touched = self._contacts()
         self._bad = muscles.status != 0
-        self._turns = muscles.model.jnt_type[muscles.model.dof_jntid] == _HINGE
-        self._size = min(1.0, float(np.median(muscles.length)))
+        self._units = np.where(turning_dofs(muscles.model), 1.0, float(np.median(muscles.length)))
         self._widths = _widths(muscles)
 
     def _contacts(self) -> NDArray[np.int64]:
@@ -47,9 +46,12 @@ class Neighbourhood:
         return np.where(other, np.nan, muscles.length)
 
     def central(self, direction: Array) -> Array:
-        """Return central differences (widths, n) of the lengths along a direction (nv,)."""
-        slides = (direction != 0.0)[~self._turns].any()
-        widths = [h * (self._size if slides else 1.0) for h in self._widths]
+        """Return central differences (widths, n) of the lengths along a direction (nv,).
+
+        The widths are those of the joint that moves farthest: in rad, along slides relative to the muscles' lengths.
+        """
+        fastest = float((np.abs(direction) / self._units).max(initial=0.0))
+        widths = [h / (fastest or 1.0) for h in self._widths]
         found = [(self._length(direction, h) - self._length(direction, -h)) / (2.0 * h) for h in widths]
         self._data.qpos[:] = self._qpos
         self._muscles.set_branch(self._data, self._branch)
@@ -63,7 +65,10 @@ def _widths(muscles: MuscleSystem) -> tuple[float, ...]:
     """
     points, starts = muscles.polylines()
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    pieces[starts[1:-1] - 1] = np.inf  # from the end of one muscle to the start of the next
+    between = (
+        starts[1:-1] - 1
+    )  # from the end of one muscle to the start of the next; a muscle may have no points
+    pieces[between[(between >= 0) & (between < len(pieces))]] = np.inf
     shortest = float(
         pieces[pieces > 0.0].min(initial=np.inf)
     )  # NaN between the parts of a muscle is left out, too

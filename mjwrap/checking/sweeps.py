@@ -10,6 +10,7 @@ from mjwrap.paths import Status
 from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.continuity import NARROW
 from mjwrap.poses.joint_sweeps import PoseMaker
+from mjwrap.poses.ties import TIE, lacks_minimum
 from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 
@@ -26,8 +27,8 @@ class Paths:
         self._without: dict[Status, dict[str, list[str]]] = {}
         self.poses = 0
 
-    def record(self, muscles: MuscleSystem, where: str) -> None:
-        """Record the muscles' last evaluation."""
+    def record(self, muscles: MuscleSystem, data: mujoco.MjData, where: str) -> None:
+        """Record the muscles' last evaluation, of data."""
         status, names = muscles.status, muscles.names
         self.poses += 1
         self.tangency.see(np.where(status == 0, muscles.tangency_error, np.nan), where, names)
@@ -35,6 +36,9 @@ class Paths:
             check.count += muscles.n
         for i in np.flatnonzero(status):
             kind = Status(int(status[i]))
+            if lacks_minimum(muscles, data, int(i)):
+                self.found.remarks.append(f"not counted: {names[i]}, {where}: {TIE}")
+                continue
             (self.inside if kind in MODELS else self.found).worst += 1.0
             told = f"{where}: {muscles.reason(int(i))}"
             self._without.setdefault(kind, {}).setdefault(names[i], []).append(told)
@@ -54,7 +58,7 @@ class Sweeper:
     """Sweep one joint after the other, and find jumps in the lengths and slopes of all muscles."""
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData, paths: Paths, jumps: Check) -> None:
-        self._muscles, self._paths, self._jumps = muscles, paths, jumps
+        self._muscles, self._data, self._paths, self._jumps = muscles, data, paths, jumps
         self._follower = PathFollower(muscles, data)
 
     def sweep(self, maker: PoseMaker, joint: int, axis: int, samples: int) -> None:
@@ -63,10 +67,17 @@ class Sweeper:
         name, muscles, beside = motion.name, self._muscles, 2.0 * NARROW * float(np.ptp(motion.at))
         self._follower.move_to(maker.base, motion.qpos[0])
         trace = self._follower.trace(
-            place, motion.at, lambda value: self._paths.record(muscles, f"{name} = {value:.4f}")
+            place, motion.at, lambda value: self._paths.record(muscles, self._data, f"{name} = {value:.4f}")
         )
         self._jumps.count += muscles.n
-        for i, (at, size, turn) in self._follower.jumps(place, trace):
+        for i, (at, size, turn) in self._follower.jumps(place, trace, motion.turning):
+            cause = "" if size else self._follower.moment_arm_break(place, trace, i, at)
+            if cause:
+                self._jumps.remarks.append(
+                    f"not counted: {muscles.names[i]} at {name} = {at:.6f}: moment arm {-1e3 * turn:+.3f} mm; {cause}, "
+                    "and no path has a continuous moment arm"
+                )
+                continue
             before, after = (self._follower.touched(place, trace, i, at + side) for side in (-beside, beside))
             what = f"length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
             self._jumps.worst += 1.0

@@ -56,8 +56,8 @@ class CheckSettings:
     """The settings of `mjwrap check`.
 
     model: a file, or "myo_sim:NAME". keyframe: the pose to sweep around, None for qpos0. poses: number of random poses,
-    drawn with seed; samples: number of poses along a sweep. json: a file for the results, "-" for
-    standard output, or None.
+    drawn with seed; samples: number of poses along a sweep. side_rule: as for `MuscleSystem`. json: a file for the
+    results, "-" for standard output, or None.
     """
 
     model: str
@@ -65,6 +65,7 @@ class CheckSettings:
     poses: int
     samples: int
     seed: int
+    side_rule: int | None
     json: str | None
 
 
@@ -72,7 +73,13 @@ def execute(options: argparse.Namespace) -> int:
     """Run the command and return its exit code."""
     return check(
         CheckSettings(
-            options.model, options.keyframe, options.poses, options.samples, options.seed, options.json
+            model=options.model,
+            keyframe=options.keyframe,
+            poses=options.poses,
+            samples=options.samples,
+            seed=options.seed,
+            side_rule=options.side_rule,
+            json=options.json,
         )
     )
 
@@ -89,6 +96,7 @@ def check(settings: CheckSettings) -> int:
             samples=settings.samples,
             base=base,
             seed=settings.seed,
+            side_rule=settings.side_rule,
             progress=progress,
         )
     facts = found.facts

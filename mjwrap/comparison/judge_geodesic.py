@@ -22,6 +22,10 @@ Ints = NDArray[np.int64]
 
 ANGLE = 1e-9  # [rad] largest corner; both programs compute contact points in closed form or to 1e-10
 INSIDE_TOLERANCE = 2e-6  # [rad] the same for MuJoCo's corner inside a geom, which it finds to 1e-6 rad
+SAME_TURN = (
+    1e-3  # [rad] two paths between the same points are on the same branch if their turns differ by less
+)
+OPPOSITE = 1e-6  # [rad] largest angle from opposite, at which rounding may choose the plane of a path
 DEPTH = 1e-12  # [radii] largest depth of a straight segment below a surface, for rounding errors
 
 
@@ -107,6 +111,14 @@ def lifted(a: Array, cylinder: bool, radius: float) -> Array:
     low = (far < radius) & (far >= (1.0 - AS_WRITTEN) * radius)
     share = np.where(low, radius / np.where(low, far, 1.0) - 1.0, 0.0)
     return a + share[:, None] * radial
+
+
+def opposite(a: Array, b: Array) -> Flags:
+    """Return whether a and b (T, 3) are opposite to each other, seen from a sphere's centre.
+
+    There all ways round the sphere are equally long, and the nearest one to either side is another one.
+    """
+    return (_norm(np.cross(a, b)) <= OPPOSITE * _norm(a) * _norm(b)) & (_dot(a, b) < 0.0)
 
 
 def judge(cylinder: bool, radius: float, a: Array, b: Array, touched: Flags, p: Array, q: Array) -> Judgement:

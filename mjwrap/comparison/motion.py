@@ -112,6 +112,7 @@ def compare_motion(
     key: int = -1,
     qpos: Array | None = None,
     seed: int = 0,
+    side_rule: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> MotionDifference:
     """Simulate a model twice from the same state, along MuJoCo's tendons and along mjwrap's paths.
@@ -123,13 +124,14 @@ def compare_motion(
         key: a keyframe to start from, or -1.
         qpos: (nq,) a start position, in place of a keyframe.
         seed: for random excitations.
+        side_rule: of mjwrap's paths, as for `MuscleSystem`.
         progress: called after every step.
 
     Returns:
         Both motions and their difference.
     """
     native_model, driven_model = pristine(model), pristine(model)
-    muscles = MuscleSystem(driven_model)
+    muscles = MuscleSystem(driven_model, side_rule=side_rule)
     excitation = Excitation(muscles, entries, seed)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):
@@ -137,7 +139,6 @@ def compare_motion(
             mujoco.mj_resetDataKeyframe(each, data, key)
         if qpos is not None:
             data.qpos[:] = qpos
-    kept = np.zeros(muscles.n, dtype=np.int64)
     times, theirs, ours, stopped = [0.0], [native.qpos.copy()], [driven.qpos.copy()], ""
     for _ in range(round(duration / float(model.opt.timestep))):
         excitation.write(native, own=False)
@@ -147,7 +148,6 @@ def compare_motion(
             if unstable(native):
                 stopped = f"MuJoCo's own run became unstable at {times[-1]:g} s"
             muscles.step(driven)
-            kept += muscles.held
         except MjwrapError as error:
             stopped = f"{stopped}; " * bool(stopped) + f"mjwrap's run stopped: {error}"
         if stopped:
@@ -161,22 +161,28 @@ def compare_motion(
     for row, a, b in zip(gap, theirs, ours, strict=True):
         mujoco.mj_differentiatePos(model, row, 1.0, a, b)
     runs = np.array(times), np.array(theirs), np.array(ours)
-    return MotionDifference(*runs, gap, dof_names(model), _places(model), stopped, _paths(muscles, kept))
+    return MotionDifference(*runs, gap, dof_names(model), _places(model), stopped, _paths(muscles))
 
 
-def _paths(muscles: MuscleSystem, kept: NDArray[np.int64]) -> str:
-    """Return a line for each muscle without a path at some steps; kept (n,): steps at which it kept its last force."""
+def _paths(muscles: MuscleSystem) -> str:
+    """Return a line for each muscle without a path at some steps: how many, the last reason, and what acted instead."""
+    state = muscles._last
     lines = muscles.report().splitlines()
     failed = [i for i, count in enumerate(muscles.failures) if count]
-    forces = {
-        i: "its last valid force was kept"
-        if kept[i] == muscles.failures[i]
-        else "its length was continued from the surface"
-        if not kept[i]
-        else f"its last valid force was kept at {counted(int(kept[i]), 'step')}, else its length was continued"
-        for i in failed
-    }
-    return "\n".join(f"{line}; {forces[i]}" for i, line in zip(failed, lines, strict=True))
+    told = []
+    for line, i in zip(lines, failed, strict=True):
+        steps = int(muscles.failures[i])
+        acted = [
+            (int(state.kept[i]), "its last valid force was kept"),
+            (int(state.forceless[i]), "it had no force, because it had had no path before"),
+        ]
+        # under Runge-Kutta a step may have several of these, at its stages
+        continued = steps - min(steps, sum(count for count, _ in acted))
+        acted.append((continued, "its length was continued from the surface"))
+        acted = [(count, what) for count, what in acted if count]
+        words = [what if count == steps else f"{what} at {counted(count, 'step')}" for count, what in acted]
+        told.append(f"{line}; {', '.join(words)}")
+    return "\n".join(told)
 
 
 def _places(model: mujoco.MjModel) -> list[int]:

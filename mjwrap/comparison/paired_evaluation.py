@@ -11,15 +11,38 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.judge_geodesic import ANGLE, INSIDE_TOLERANCE, Fault, judge, judge_held, lifted
+from mjwrap.comparison.judge_geodesic import (
+    ANGLE,
+    INSIDE_TOLERANCE,
+    SAME_TURN,
+    Fault,
+    judge,
+    judge_held,
+    lifted,
+    opposite,
+)
+from mjwrap.comparison.motion_records import (
+    Frames,
+    Numbers,
+    assign_contacts,
+    in_frame,
+    is_cylinder,
+    own_points,
+)
 from mjwrap.comparison.tendons import Span, SpanPoints, WrapRecord, muscle_spans, tendon_spans
+from mjwrap.mjcf.inside import reference_pose
 from mjwrap.poses.continuation import PathFollower, SweepTrace
 from mjwrap.poses.joint_sweeps import PoseSequence
+from mjwrap.poses.sizes import route_size, turning_dofs
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-LENGTH = 1e-9  # [m] largest difference of a path's length from the sum of its parts
+LENGTH = (
+    3e-9  # largest difference of a path's length from the sum of its parts, as a share of the muscle's size
+)
+TURN = 2.0 * np.pi
+NARROW = 1e-6  # the same of two points that coincide, so that rounding chooses the direction between them
 
 
 @dataclass
@@ -27,8 +50,9 @@ class PathRecord:
     """One program's path of one muscle over a motion, (T,) each, and its judgement.
 
     length [m], velocity [m/s], jacobian (T, nv) ∂l/∂q; fault: `Fault` of the worst span, measure: of this fault, span:
-    index of this span; turns (T, spans) [rad]: the branch, see `judge_geodesic.Judgement`; touched (T, spans);
-    hinted (T, spans): whether it passes a cylinder on the side of its side site, true if it has no side site.
+    index of this span; turns (T, spans) [rad]: the branch, see `judge_geodesic.Judgement`; touched (T, spans); hinted
+    (T, spans): whether it passes a cylinder on the side that its side site means, by the muscle's side rule; true if it
+    has no side site.
     """
 
     length: Array
@@ -43,12 +67,13 @@ class PathRecord:
 
 
 class _ComparedMuscle(NamedTuple):
-    """A muscle to compare: name, index in the MuscleSystem or -1, tendon, spans."""
+    """A muscle to compare: name, index in the MuscleSystem or -1, tendon, spans, size [m] (`poses/sizes.py`)."""
 
     name: str
     index: int
     tendon: int
     spans: list[Span]
+    size: float
 
 
 @dataclass
@@ -56,6 +81,10 @@ class MusclePair:
     """One muscle in both programs over a motion.
 
     index: in the `MuscleSystem`; status (T,): of mjwrap. A muscle that stays with MuJoCo has index -1, mjwrap None.
+    size: of the muscle [m]; arms (nv,): sizes of its moment arms, the size about joints that turn and 1 along slides.
+    tie (T,): the ends of a span are opposite to each other, seen from its sphere's centre, so that all ways round are
+    equally long; kink (T,): two stops coincide, so that there is no direction from one to the other, or an end lies on
+    the surface in which a span is held.
     """
 
     name: str
@@ -65,6 +94,10 @@ class MusclePair:
     native: PathRecord
     mjwrap: PathRecord | None
     status: Ints
+    size: float
+    arms: Array
+    tie: NDArray[np.bool_]
+    kink: NDArray[np.bool_]
 
 
 @dataclass
@@ -94,6 +127,8 @@ class Comparer:
         mujoco.mj_kinematics(self._native, self._native_data)
         self.data = mujoco.MjData(self.model)
         self.follower = PathFollower(muscles, self.data)
+        self._turning = turning_dofs(self.model)
+        self._rest = reference_pose(self.model)
         self.left_out: dict[str, str] = {}
         self._selected: list[_ComparedMuscle] = []
         for name in wanted:
@@ -112,23 +147,30 @@ class Comparer:
             if declared.tendon < 0:
                 return "it has no tendon in MuJoCo"
             own = muscle_spans(declared)
-            if own is None or own != tendon_spans(model, self._native_data, declared.tendon):
+            spans = tendon_spans(model, self._native_data, declared.tendon)
+            if own is None or [span._replace(turn=0.0) for span in own] != spans:
                 return "its tendon is a placeholder: mjwrap's route is different"
-            return _ComparedMuscle(name, index, declared.tendon, own)
+            return self._sized(name, index, declared.tendon, own)
         actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if actuator < 0 or int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
             return "it has no spatial tendon"
         tendon = int(model.actuator_trnid[actuator, 0])
         spans = tendon_spans(model, self._native_data, tendon)
-        return _ComparedMuscle(name, -1, tendon, spans) if spans else "it has no spatial tendon"
+        return self._sized(name, -1, tendon, spans) if spans else "it has no spatial tendon"
+
+    def _sized(self, name: str, index: int, tendon: int, spans: list[Span]) -> _ComparedMuscle:
+        legs = [(span.start, span.end, span.weight) for span in spans]
+        geoms = [span.geom for span in spans if span.geom >= 0]
+        size = route_size(self.model, self._rest, legs, geoms)
+        return _ComparedMuscle(name, index, tendon, spans, size)
 
     def evaluate(self, motion: PoseSequence, start: Array | None = None) -> Batch:
         """Evaluate all poses of a motion; start (nq,): pose from which a continuous motion takes its branches."""
         count, nv = len(motion.at), self.model.nv
-        native, mine = _Numbers(count, self.model.ntendon, nv), _Numbers(count, self.muscles.n, nv)
+        native, mine = Numbers(count, self.model.ntendon, nv), Numbers(count, self.muscles.n, nv)
         wraps = WrapRecord(self.model, count)
         contacts: list[dict[int, Array]] = []
-        geoms = _Frames(count, self.model)
+        geoms = Frames(count, self.model)
         taken = [muscle.index for muscle in self._selected if muscle.index >= 0]
         branches: list[Array] = []
         self.muscles.reset(self.data)
@@ -145,18 +187,22 @@ class Comparer:
             branches.append(self.muscles.branch(self.data))
         slopes = np.einsum("tnv,tv->tn", mine.jacobian, motion.tangent)
         batch = Batch(motion, SweepTrace(motion.at, mine.length, slopes, mine.status == 0, branches))
-        for name, index, tendon, spans in self._selected:
+        for name, index, tendon, spans, size in self._selected:
             points = wraps.points(tendon, spans)
-            record = self._record(spans, points, geoms, INSIDE_TOLERANCE, *native.of(tendon))
+            record = self._record(spans, points, geoms, INSIDE_TOLERANCE, size, *native.of(tendon))
             own_record, status = None, np.zeros(count, dtype=np.int64)
             if index >= 0:
-                own = [_own_points(at) for at in points]
-                _assign(spans, own, [contact[index] for contact in contacts], self.model, geoms)
+                own = [own_points(at) for at in points]
+                assign_contacts(spans, own, [contact[index] for contact in contacts], self.model, geoms)
                 own_record, status = (
-                    self._record(spans, own, geoms, ANGLE, *mine.of(index)),
+                    self._record(spans, own, geoms, ANGLE, size, *mine.of(index)),
                     mine.status[:, index],
                 )
-            batch.pairs.append(MusclePair(name, index, tendon, spans, record, own_record, status))
+            arms = np.where(self._turning, size, 1.0)
+            tie, kink = self._degenerate(spans, points, geoms, size)
+            batch.pairs.append(
+                MusclePair(name, index, tendon, spans, record, own_record, status, size, arms, tie, kink)
+            )
         return batch
 
     def native_at(self, qpos: Array, qvel: Array) -> tuple[Array, Array, Array]:
@@ -177,8 +223,27 @@ class Comparer:
         muscles = self.muscles
         return muscles.length.copy(), muscles.velocity.copy(), jacobian, muscles.status.copy()
 
+    def _degenerate(
+        self, spans: list[Span], points: list[SpanPoints], geoms: Frames, size: float
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return at which poses (T,) a muscle has a tie, and a kink: see `MusclePair`."""
+        tie, kink = (np.zeros(len(points[0].a), dtype=np.bool_) for _ in range(2))
+        for span, at in zip(spans, points, strict=True):
+            kink |= np.linalg.norm(at.b - at.a, axis=1) <= NARROW * size
+            if span.geom < 0:
+                continue
+            ends = [geoms.local(span.geom, x) for x in (at.a, at.b)]
+            if span.inside:
+                flat = 2 if is_cylinder(self.model, span.geom) else 3
+                radius = float(self.model.geom_size[span.geom, 0])
+                for end in ends:
+                    kink |= np.abs(np.linalg.norm(end[:, :flat], axis=1) - radius) <= NARROW * size
+            elif not is_cylinder(self.model, span.geom):
+                tie |= opposite(*ends)
+        return tie, kink
+
     def _record(
-        self, spans: list[Span], points: list[SpanPoints], geoms: _Frames, angle: float,
+        self, spans: list[Span], points: list[SpanPoints], geoms: Frames, angle: float, size: float,
         length: Array, velocity: Array, jacobian: Array,
     ) -> PathRecord:  # fmt: skip
         count = len(length)
@@ -193,7 +258,7 @@ class Comparer:
             )
             arc = np.zeros(count)
             if span.geom >= 0:
-                local = _in_frame(self.model, span.geom, geoms, at)
+                local = in_frame(self.model, span.geom, geoms, at)
                 found = judge_held(*local, angle) if span.inside else judge(*local)
                 turns[:, s], arc = found.turn, np.where(at.touched, found.arc, 0.0)
                 if not span.inside:  # what lies between a surface and an end just below it does not count
@@ -203,104 +268,25 @@ class Comparer:
                     straight = np.where(at.touched, over, straight)
                 if span.hint >= 0 and not span.inside:
                     side = geoms.local(span.geom, geoms.sites[:, span.hint])
-                    hinted[:, s] = np.einsum("ti,ti->t", found.middle[:, :2], side[:, :2]) > 0.0
+                    if span.turn:
+                        near = np.abs(span.turn - found.turn) < np.pi + SAME_TURN
+                        most = np.abs(found.turn + TURN * np.round((span.turn - found.turn) / TURN))
+                        hinted[:, s] = near | (
+                            most > TURN
+                        )  # more than one turn is followed in small steps only
+                    else:
+                        hinted[:, s] = np.einsum("ti,ti->t", found.middle[:, :2], side[:, :2]) > 0.0
                 new = (found.fault > 0) & (fault == 0)
                 fault[new], measure[new], worst[new] = found.fault[new], found.measure[new], s
             total += span.weight * (straight + arc)
         off = np.abs(total - length)
-        new = (fault == 0) & ~(off <= LENGTH)
+        new = (fault == 0) & ~(off <= LENGTH * size)
         fault[new], measure[new] = Fault.WRONG_LENGTH, off[new]
         touched = np.stack([at.touched for at in points], axis=1)
         return PathRecord(length, velocity, jacobian, fault, measure, worst, turns, touched, hinted)
-
-
-class _Frames:
-    """The poses of geoms and sites over `count` poses: centre (T, ngeom, 3), rotation (T, ngeom, 3, 3), sites."""
-
-    def __init__(self, count: int, model: mujoco.MjModel) -> None:
-        self.centre, self.rotation = np.zeros((count, model.ngeom, 3)), np.zeros((count, model.ngeom, 3, 3))
-        self.sites = np.zeros((count, model.nsite, 3))
-
-    def keep(self, k: int, data: mujoco.MjData) -> None:
-        """Store pose k."""
-        self.centre[k], self.rotation[k] = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
-        self.sites[k] = data.site_xpos
-
-    def local(self, geom: int, points: Array) -> Array:
-        """Return world points (T, 3) in a geom's frame."""
-        return np.einsum("tji,tj->ti", self.rotation[:, geom], points - self.centre[:, geom])
-
-
-class _Numbers:
-    """Lengths, velocities, jacobians and status of `n` paths over `count` poses."""
-
-    def __init__(self, count: int, n: int, nv: int) -> None:
-        self.length, self.velocity = np.zeros((count, n)), np.zeros((count, n))
-        self.jacobian, self.status = np.zeros((count, n, nv)), np.zeros((count, n), dtype=np.int64)
-
-    def keep(self, k: int, length: Array, velocity: Array, jacobian: Array, status: Ints | int = 0) -> None:
-        self.length[k], self.velocity[k], self.jacobian[k], self.status[k] = (
-            length,
-            velocity,
-            jacobian,
-            status,
-        )
-
-    def of(self, i: int) -> tuple[Array, Array, Array]:
-        return self.length[:, i], self.velocity[:, i], self.jacobian[:, i]
 
 
 def _sparse(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[NDArray[np.int32], ...]:
     """Return row counts, row starts and columns of ten_J; in newer MuJoCo they are in the model."""
     home = model if hasattr(model, "ten_J_rownnz") else data
     return home.ten_J_rownnz, home.ten_J_rowadr, home.ten_J_colind.reshape(-1)
-
-
-def _in_frame(
-    model: mujoco.MjModel, geom: int, geoms: _Frames, at: SpanPoints
-) -> tuple[bool, float, Array, Array, NDArray[np.bool_], Array, Array]:
-    """Return the arguments of `judge`: kind, radius, and the points in the geom's frame."""
-    a, b, p, q = (geoms.local(geom, x) for x in (at.a, at.b, at.p, at.q))
-    cylinder = int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-    return cylinder, float(model.geom_size[geom, 0]), a, b, at.touched, p, q
-
-
-def _own_points(native: SpanPoints) -> SpanPoints:
-    """Return a span of mjwrap's path with the same end points and no contact yet."""
-    own = SpanPoints.empty(len(native.a))
-    own.a, own.b = native.a, native.b
-    return own
-
-
-def _assign(
-    spans: list[Span],
-    own: list[SpanPoints],
-    pairs: list[Array],
-    model: mujoco.MjModel,
-    geoms: _Frames,
-) -> None:
-    """Assign every contact pair (k, 2, 3) of mjwrap to the span that it fits best, in order."""
-    for t, contacts in enumerate(pairs):
-        free = [s for s, span in enumerate(spans) if span.geom >= 0]
-        for pair in contacts:
-            s = min(free, key=lambda s: _misfit(spans[s], own[s], pair, model, geoms, t))
-            own[s].touched[t], own[s].p[t], own[s].q[t] = True, pair[0], pair[1]
-            free = [f for f in free if f > s]
-
-
-def _misfit(span: Span, at: SpanPoints, pair: Array, model: mujoco.MjModel, geoms: _Frames, t: int) -> float:
-    """Return the distance of two contact points from a span's surface and tangents [m]."""
-    rotation, centre, radius = (
-        geoms.rotation[t, span.geom],
-        geoms.centre[t, span.geom],
-        float(model.geom_size[span.geom, 0]),
-    )
-    misfit = 0.0
-    for point, end in ((pair[0], at.a[t]), (pair[1], at.b[t])):
-        local, away = rotation.T @ (point - centre), rotation.T @ (end - point)
-        if int(model.geom_type[span.geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
-            local[2] = 0.0
-        distance = float(np.linalg.norm(local))
-        corner = 0.0 if span.inside else abs(float(local @ away)) / max(distance, 1e-300)
-        misfit = max(misfit, abs(distance - radius), corner)
-    return misfit

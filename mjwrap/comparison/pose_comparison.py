@@ -29,12 +29,14 @@ class PoseComparison:
         jumps: the jumps of both programs.
         left_out: muscles that were left out, with the reason.
         poses: number of poses.
+        side_rule: the rule of mjwrap's paths.
     """
 
     muscles: dict[str, MuscleSummary] = field(default_factory=dict)
     jumps: list[Jump] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     poses: int = 0
+    side_rule: int = 3
 
     def total(self, outcome: Outcome) -> int:
         """Return the number of poses, over all muscles, with an outcome."""
@@ -55,6 +57,7 @@ def compare_poses(
     seed: int = 0,
     base: Array | None = None,
     each: Callable[[Batch], object] | None = None,
+    side_rule: int | None = None,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> PoseComparison:
     """Compare both programs along sweeps of every joint around the base pose, and at random poses.
@@ -67,6 +70,7 @@ def compare_poses(
         seed: of the random poses.
         base: (nq,) base pose; qpos0 if None.
         each: called with every evaluated batch.
+        side_rule: of mjwrap's paths, as for `MuscleSystem`; MuJoCo's tendons have that of the running MuJoCo.
         progress: called with (name, done, all) before each motion.
 
     Returns:
@@ -76,7 +80,7 @@ def compare_poses(
         ModelError: a name is not that of a muscle.
     """
     model = pristine(model)
-    muscles = MuscleSystem(model)
+    muscles = MuscleSystem(model, side_rule=side_rule)
     known = [*muscles.names, *muscles.native]
     unknown = [name for name in names or () if name not in known]
     if unknown:
@@ -84,7 +88,7 @@ def compare_poses(
             f"no muscle {', '.join(repr(n) for n in unknown)}; muscles: {', '.join(known) or 'none'}"
         )
     comparer = Comparer(muscles, list(names or known))
-    found = PoseComparison(left_out=comparer.left_out)
+    found = PoseComparison(left_out=comparer.left_out, side_rule=muscles.side_rule)
     start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
     makers = [PoseMaker(model, start, seed)]
     joints = makers[0].joints()
@@ -98,7 +102,7 @@ def compare_poses(
         found.poses += len(batch.motion.at)
         for pair in batch.pairs:
             summary = found.muscles.setdefault(
-                pair.name, MuscleSummary(pair.name, muscles.native.get(pair.name, ""))
+                pair.name, MuscleSummary(pair.name, muscles.native.get(pair.name, ""), pair.size)
             )
             summary.add(model, batch.motion, pair)
         if each is not None:

@@ -78,6 +78,7 @@ def compare_tables(
     lengths: Table | None = None,
     moment_arms: Mapping[str, Table] | None = None,
     *,
+    side_rule: int | None = None,
     each: Callable[[TableColumn], object] | None = None,
 ) -> list[TableDifference]:
     """Compare MuJoCo's tendons and mjwrap's paths with tables of another program, muscle by muscle.
@@ -93,6 +94,7 @@ def compare_tables(
         lengths: a table of lengths [m].
         moment_arms: tables of moment arms [m] by the joint's name, positive where the muscle's tension increases the
             coordinate.
+        side_rule: of mjwrap's paths, as for `MuscleSystem`.
         each: called with the curves of every muscle in the tables.
 
     Returns:
@@ -104,18 +106,18 @@ def compare_tables(
     model = pristine(model)
     found: list[TableDifference] = []
     if lengths is not None:
-        found += _compare(model, time, qpos, lengths, "", each)
+        found += _compare(model, time, qpos, lengths, "", side_rule, each)
     for joint, table in (moment_arms or {}).items():
-        found += _compare(model, time, qpos, table, joint, each)
+        found += _compare(model, time, qpos, table, joint, side_rule, each)
     return found
 
 
 def _compare(
-    model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str,
+    model: mujoco.MjModel, time: Array, qpos: Array, table: Table, joint: str, side_rule: int | None,
     each: Callable[[TableColumn], object] | None,
 ) -> list[TableDifference]:  # fmt: skip
     dof = _dof(model, joint) if joint else -1
-    muscles = MuscleSystem(model)
+    muscles = MuscleSystem(model, side_rule=side_rule)
     known = [*muscles.names, *muscles.native]
     columns = {_muscle_of(name, joint): table[name] for name in table.names}
     if not set(columns) & set(known):

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf import MuscleDeclaration, tendon_stops
+from mjwrap.mjcf import MuscleDeclaration, Node, tendon_stops
 
 Array = NDArray[np.float64]
 _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
@@ -18,7 +18,7 @@ _PULLEY_MARK = -2  # in wrap_obj: -1 for sites, the id for geoms
 class Span(NamedTuple):
     """A part of a tendon from one site to the next, over a geom (-1: none); weight: its factor in the length (pulleys).
 
-    inside: whether it must meet the geom's solid.
+    inside: whether it must meet the geom's solid. turn: as for `mjcf.Node`, for mjwrap's paths.
     """
 
     start: int
@@ -27,6 +27,7 @@ class Span(NamedTuple):
     hint: int
     weight: float
     inside: bool = False
+    turn: float = 0.0
 
 
 def tendon_spans(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Span]:
@@ -51,16 +52,17 @@ def muscle_spans(muscle: MuscleDeclaration) -> list[Span] | None:
     """Return the spans of a declared muscle, or None if it has several geoms between two sites."""
     spans: list[Span] = []
     for route in muscle.routes:
-        last, geom, hint, inside = route.origin, -1, -1, False
-        for node in route.nodes:
-            if node.geom >= 0:
-                if geom >= 0:
-                    return None
-                geom, hint, inside = node.geom, node.hint_site, node.inside
+        last, over = route.origin, Node()
+        for node in (*route.nodes, Node(site=route.insertion)):
+            if node.geom < 0:
+                spans.append(
+                    Span(last, node.site, over.geom, over.hint_site, route.weight, over.inside, over.turn)
+                )
+                last, over = node.site, Node()
+            elif over.geom < 0:
+                over = node
             else:
-                spans.append(Span(last, node.site, geom, hint, route.weight, inside))
-                last, geom, hint, inside = node.site, -1, -1, False
-        spans.append(Span(last, route.insertion, geom, hint, route.weight, inside))
+                return None
     return spans
 
 

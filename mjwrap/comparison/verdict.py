@@ -10,51 +10,62 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.comparison.judge_geodesic import Fault
+from mjwrap.comparison.judge_geodesic import SAME_TURN, Fault
 from mjwrap.comparison.paired_evaluation import MusclePair, PathRecord
 from mjwrap.mjcf import name_of
 from mjwrap.paths import Status
 from mjwrap.poses.joint_sweeps import PoseSequence
 
 Array = NDArray[np.float64]
-AGREE = 1e-9  # [m, m/s, m/rad] largest difference of two true geodesics on the same branch
-INSIDE_TOLERANCE = 1e-6  # the same if a string is held inside: MuJoCo finds its corner to 1e-6 rad
+AGREE = (
+    3e-9  # largest difference of two true geodesics on the same branch, relative to the muscle (`relative`)
+)
+INSIDE_TOLERANCE = 3e-6  # the same if a string is held inside: MuJoCo finds its corner to 1e-6 rad
 
 
 class Outcome(enum.IntEnum):
     """The outcome of the comparison of one muscle at one pose."""
 
     AGREE = 0  # both are the same true geodesic
-    OTHER_BRANCH = 1  # both are true geodesics, but go round the cylinder in different ways
+    OTHER_BRANCH = 1  # both are true geodesics, but go round the surface in different ways
     MUJOCO_NOT_GEODESIC = 2  # mjwrap's path is a true geodesic, MuJoCo's is not
     NO_PATH = 3  # mjwrap found no path, and MuJoCo's is not a geodesic either
     MJWRAP_FAILED = 4  # mjwrap found no path, but MuJoCo's is a true geodesic
     MJWRAP_WRONG = 5  # mjwrap's path is not a true geodesic
     UNEXPLAINED = 6  # both are judged to be the same true geodesic, but their numbers differ
     WRONG_SIDE = (
-        7  # from a cold start mjwrap passes a cylinder on the side away from its hint, MuJoCo does not
+        7  # from a cold start mjwrap passes a cylinder not on the side that its hint means, MuJoCo does
     )
+    KINK = 8  # a kink, at which the path has no derivative, or a tie, at which no way round is the shortest
 
 
 MJWRAP_AT_FAULT = (Outcome.MJWRAP_FAILED, Outcome.MJWRAP_WRONG, Outcome.UNEXPLAINED, Outcome.WRONG_SIDE)
 
 
-def outcomes(pair: MusclePair, continuous: bool) -> NDArray[np.int64]:
-    """Return the `Outcome` (T,) of a muscle in both programs; continuous: whether mjwrap keeps its branch."""
+def outcomes(pair: MusclePair, motion: PoseSequence) -> NDArray[np.int64]:
+    """Return the `Outcome` (T,) of a muscle in both programs along a motion.
+
+    At a tie of equally long ways round a sphere each program takes one of them, and at a kink each has one of the
+    derivatives to either side; neither is at fault.
+    """
     native, mine = pair.native, pair.mjwrap
     assert mine is not None
     count = len(native.length)
-    same = (np.abs(native.turns - mine.turns) < 1e-3).all(axis=1)
+    same = (np.abs(native.turns - mine.turns) < SAME_TURN).all(axis=1)
     held = (native.touched & [span.inside for span in pair.spans]).any(axis=1)
-    near = differences(native, mine).max(axis=0) <= np.where(held, INSIDE_TOLERANCE, AGREE)
+    gaps, allowed = relative(pair, motion), np.where(held, INSIDE_TOLERANCE, AGREE)
+    near, as_long = gaps.max(axis=0) <= allowed, gaps[0] <= allowed
     found = np.full(count, Outcome.UNEXPLAINED, dtype=np.int64)
     for here, outcome in (  # the last outcome that applies is used
+        (same & as_long & pair.kink, Outcome.KINK),
+        (same & as_long & pair.tie, Outcome.OTHER_BRANCH),
         (near & same, Outcome.AGREE),
         (~same, Outcome.OTHER_BRANCH),
-        (~same & (not continuous) & (native.hinted & ~mine.hinted).any(axis=1), Outcome.WRONG_SIDE),
+        (~same & (not motion.continuous) & (native.hinted & ~mine.hinted).any(axis=1), Outcome.WRONG_SIDE),
         (native.fault != 0, Outcome.MUJOCO_NOT_GEODESIC),
         (mine.fault != 0, Outcome.MJWRAP_WRONG),
         ((pair.status != 0) & (native.fault == 0), Outcome.MJWRAP_FAILED),
+        ((pair.status == Status.NOT_MINIMAL) & (native.fault == 0) & pair.tie, Outcome.KINK),
         ((pair.status != 0) & (native.fault != 0), Outcome.NO_PATH),
     ):
         found[here] = outcome
@@ -65,6 +76,19 @@ def differences(native: PathRecord, mine: PathRecord) -> Array:
     """Return (3, T): differences in length [m], velocity [m/s], largest moment arm [m/rad]."""
     arm = np.abs(mine.jacobian - native.jacobian).max(axis=1, initial=0.0)
     return np.array([np.abs(mine.length - native.length), np.abs(mine.velocity - native.velocity), arm])
+
+
+def relative(pair: MusclePair, motion: PoseSequence) -> Array:
+    """Return (3, T): differences in length, velocity and largest moment arm, relative to the muscle's size.
+
+    A velocity is relative to that of a muscle whose moment arms are all as large as the muscle, and along slides 1.
+    """
+    native, mine = pair.native, pair.mjwrap
+    assert mine is not None
+    fastest = np.abs(motion.qvel) @ pair.arms
+    arm = (np.abs(mine.jacobian - native.jacobian) / pair.arms).max(axis=1, initial=0.0)
+    velocity = np.abs(mine.velocity - native.velocity) / np.where(fastest > 0.0, fastest, pair.size)
+    return np.array([np.abs(mine.length - native.length) / pair.size, velocity, arm])
 
 
 @dataclass
@@ -102,12 +126,16 @@ class MuscleSummary:
     geom); measures: their largest measures; own_faults, statuses: mjwrap's faults and failures by message; agreement
     (3,): the largest differences at poses where both are the same true geodesic; length, velocity, moment_arm: the
     largest differences of all poses; longer_branch [m]: mjwrap minus MuJoCo where they are on different branches, of
-    the largest size.
+    the largest size; size: of the muscle [m]; ties, cold_branches: how many poses on different branches are ties of
+    equally long ways round a sphere, and how many are cold starts.
     """
 
     name: str
     native_only: str = ""
+    size: float = 1.0
     poses: int = 0
+    ties: int = 0
+    cold_branches: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     faults: Counter[tuple[Fault, str]] = field(default_factory=Counter)
     measures: dict[tuple[Fault, str], float] = field(default_factory=dict)
@@ -135,7 +163,7 @@ class MuscleSummary:
         if mine is None:
             self._keep_curves(motion, pair, 0.0)
             return
-        found = outcomes(pair, motion.continuous)
+        found = outcomes(pair, motion)
         self.counts.update(Outcome(int(o)).name for o in found)
         self.statuses.update(Status(int(s)).message for s in pair.status[pair.status != 0])
         wrong = found == Outcome.MJWRAP_WRONG
@@ -155,6 +183,8 @@ class MuscleSummary:
         if same.any():
             self.agreement = np.maximum(self.agreement, gaps[:, same].max(axis=1))
         other = found == Outcome.OTHER_BRANCH
+        self.ties += int((other & pair.tie).sum())
+        self.cold_branches += int((other & ~pair.tie).sum()) * (not motion.continuous)
         if other.any():
             longer = (mine.length - native.length)[other]
             most = float(longer[np.argmax(np.abs(longer))])
@@ -187,7 +217,7 @@ class MuscleSummary:
         if not motion.continuous:
             return
         change = float(np.ptp(pair.native.length))
-        score = (gap if gap > AGREE else 0.0, change)
+        score = (gap if gap > AGREE * pair.size else 0.0, change)
         if self.curves is not None and score <= self._score:
             return
         self._score = score

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from mjwrap.comparison.judge_geodesic import Fault
 from mjwrap.comparison.jumps import Jump
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
+from mjwrap.poses.ties import KINK, TIE
 from mjwrap.text import counted
 
 
@@ -31,6 +32,8 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
             "-", f"stays with MuJoCo: {summary.native_only}" + (f". MuJoCo's path: {told}" if told else "")
         )
     counts, poses = summary.counts, summary.poses
+    breaks = [jump for jump in jumps if jump.cause]
+    jumps = [jump for jump in jumps if not jump.cause]
     own_jumps, native_jumps = _jumps(jumps, "mjwrap"), _jumps(jumps, "MuJoCo")
     if summary.at_fault or own_jumps:
         return Verdict("MuJoCo", "; ".join(part for part in (_own_faults(summary), own_jumps) if part))
@@ -45,14 +48,8 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
         parts.append(
             f"{native_jumps}, where mjwrap's path {'continues smoothly' if smooth else 'continues or ends'}"
         )
-    if counts[Outcome.OTHER_BRANCH.name]:
-        longer = "longer" if summary.longer_branch > 0.0 else "shorter"
-        parts.append(
-            f"at {counts[Outcome.OTHER_BRANCH.name]} of {poses} poses the two go round the cylinder in different ways, "
-            f"both true geodesics (mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer}): MuJoCo chooses "
-            "the side anew at every pose; mjwrap keeps it along a sweep, because a string cannot pass through the "
-            "cylinder"
-        )
+    parts += _other_ways(summary)
+    parts += _breaks(summary, breaks)
     right = "mjwrap in motion" if native_jumps else "both"
     if counts[Outcome.MUJOCO_NOT_GEODESIC.name]:
         right = "mjwrap"
@@ -66,6 +63,53 @@ def verdict(summary: MuscleSummary, jumps: Sequence[Jump]) -> Verdict:
         inside = _native_faults(summary, poses, {Fault.ENDPOINT_INSIDE})
         parts.append(inside or f"at {no_path} of {poses} poses neither has a geodesic path")
     return Verdict(right, "; ".join(parts))
+
+
+def _other_ways(summary: MuscleSummary) -> list[str]:
+    """Return, as text, at how many poses both go round a cylinder in different ways, and why."""
+    longer = "longer" if summary.longer_branch > 0.0 else "shorter"
+    cold = summary.cold_branches
+    moving = summary.counts[Outcome.OTHER_BRANCH.name] - summary.ties - cold
+    told = (
+        "the two go round the cylinder in different ways, both true geodesics "
+        f"(mjwrap's up to {1e3 * abs(summary.longer_branch):.3g} mm {longer})"
+    )
+    found = []
+    if moving:
+        found.append(
+            f"at {moving} of {summary.poses} poses {told}: MuJoCo chooses the side anew at every pose; mjwrap keeps it "
+            "along a sweep, because a string cannot pass through the cylinder"
+        )
+    if cold:
+        found.append(
+            f"at {cold} of {summary.poses} random poses {told}: MuJoCo chooses the side anew at every pose; mjwrap "
+            "starts on the side to which its rule for side sites (side_rule), or its own hint, leads"
+        )
+    return found
+
+
+def _breaks(summary: MuscleSummary, jumps: Sequence[Jump]) -> list[str]:
+    """Return, as text, where no path has a derivative, so that each program may have another one."""
+    found = []
+    if summary.ties:
+        found.append(
+            f"at {counted(summary.ties, 'pose')} the straight line passes through a sphere's centre: all ways round "
+            "are equally long, and each program takes one of them"
+        )
+    kinks = summary.counts[Outcome.KINK.name]
+    if kinks:
+        found.append(
+            f"at {counted(kinks, 'pose')} {KINK}; or {TIE}: no moment arm exists there, and the two programs need not "
+            "give the same one"
+        )
+    for cause in dict.fromkeys(jump.cause for jump in jumps):
+        here = [jump for jump in jumps if jump.cause == cause]
+        who = " and ".join(p for p in ("MuJoCo", "mjwrap") if any(jump.program == p for jump in here))
+        arm = 1e3 * max(abs(jump.slope) for jump in here)
+        found.append(
+            f"the moment arm (not the length) of {who} jumps by up to {arm:.3g} mm where {cause}: that is no fault"
+        )
+    return found
 
 
 def _native_faults(summary: MuscleSummary, poses: int, kinds: set[Fault]) -> str:
@@ -91,7 +135,8 @@ def _own_faults(summary: MuscleSummary) -> str:
     sides = summary.counts[Outcome.WRONG_SIDE.name]
     if sides:
         told.append(
-            f"at {counted(sides, 'pose')} mjwrap starts on the side of the cylinder opposite to its side site"
+            f"at {counted(sides, 'pose')} mjwrap does not start on the side to which its side site leads at the "
+            "reference pose"
         )
     for words, count in summary.own_faults.most_common(3):
         told.append(f"mjwrap's path is not a geodesic at {counted(count, 'pose')}: {words}")

@@ -11,10 +11,11 @@ this order:
     Z_LIMIT     half length along local z beyond which a contact is out of range [m]; infinite where there is none
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
-    HINT  (4)   flag (0 or 1), then the hint in S [m]
+    HINT  (4)   flag (0: none; 1, or one of those below), then the hint in S [m]
     S_... (11)  the saved solution: all that a warm start needs
     W_...       scratch and results of the last evaluation, world frame relative to the path's first point
     HANDLE      address of further data of the surface, 0 where there are none
+    HINT_TURN   angle swept about a cylinder's axis near which a hinted string starts, 0 where the hint itself decides
 
 The columns KIND to Z_LIMIT, which are read most often, fill the row's first cache line.
 
@@ -68,6 +69,10 @@ ABOUT_AXIS = 2.0  # a cylinder about z
 # An end that lies less deep inside a surface than this share of its size lies on it, as far as can be known from a file
 # with six digits: each coordinate of an end up to ten sizes away is rounded by 5e-5 sizes at most.
 AS_WRITTEN = 1e-4
+
+# ------------------------------------------------------------ values of the flag HINT, beside 0 and 1; all are positive
+RANDOM_HINT = 2.0  # a hint that a search has drawn, and removes
+UNMET_HINT = 3.0  # a hint that the path does not meet, once that is tested
 
 # --------------------------------------------------------------------------------------------- statuses
 CONVERGED = 0
@@ -131,7 +136,7 @@ W_END_TARGET = 155  # 1 while Newton's method moves Q to an end on the surface f
 INSIDE = 156  # ABOUT_POINT or ABOUT_AXIS if a string between two fixed points is held inside the solid
 HANDLE = 157
 W_OUT = 158  # 1 where the geodesic leaves the ranges in which a user's surface is valid, 0 else
-W_UNMET = 159  # 1 where the path passes another side than the hint asks for, once that is tested
+HINT_TURN = 159
 ROW = 160  # 20 cache lines
 
 # ------------------------------------------------------------------------- columns of a chain's `info`

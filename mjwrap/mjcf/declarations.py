@@ -13,8 +13,9 @@ from mjwrap.surfaces import Surface
 class Node:
     """One stop of a route: a via site, or a surface in a geom's frame, which may have a site as hint.
 
-    inside: the string must meet the solid, as with a side site inside, and is not kept out of it.
-    sizes: the numeric that gives the surface's sizes, -1 if the geom gives them.
+    inside: the string must meet the solid, as with a side site inside, and is not kept out of it. sizes: the numeric
+    that gives the surface's sizes, -1 if the geom gives them. turn: if a tendon's side site picks the way round a
+    cylinder, the angle by which the string goes round at the reference pose (`side_rules.py`), else 0.
     """
 
     site: int = -1
@@ -23,6 +24,7 @@ class Node:
     surface: Surface | None = None
     inside: bool = False
     sizes: int = -1
+    turn: float = field(default=0.0, compare=False)
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,11 @@ class MuscleDeclaration:
 
 @dataclass(frozen=True)
 class Declarations:
-    """All muscles of a model, and the native muscle actuators that cannot be taken over, with the reasons."""
+    """All muscles of a model, and the native muscle actuators that cannot be taken over, with the reasons.
+
+    side_rule: the rule by which the tendons' side sites were read (`side_rules.py`).
+    """
 
     muscles: list[MuscleDeclaration]
     native: dict[str, str] = field(default_factory=dict)
+    side_rule: int = 3

@@ -31,6 +31,7 @@ import numpy as np
 
 COLUMN = 9  # the last column of gainprm, biasprm and dynprm
 PLUGIN_INSTANCE = "mjwrap"  # name of the plugin's instance, after the prefix of an attached model
+SIDE_RULE_PLACE = 3  # place of the side rule among the texts of an instance's configuration
 IDLE = ord("!")  # first character of the configuration of an idle instance: quoted names do not contain it
 # force range [N] of a disabled actuator in an MjSpec: the compiler rejects 0 to 0, to_xml writes nothing smaller,
 # and a muscle's force is never positive, so that it becomes zero
@@ -201,6 +202,24 @@ def set_idle(model: mujoco.MjModel, instance: int) -> None:
     first = model.plugin_attradr[instance]
     if model.plugin_attr[first] != 0:  # one without muscles drives none
         model.plugin_attr[first] = IDLE
+
+
+def stored_side_rule(model: mujoco.MjModel) -> int:
+    """Return the side rule (`mjcf/side_rules.py`) that `install` stored in a model; 0 without one.
+
+    Of several instances the model's own counts; those of attached models count if they agree.
+    """
+    rules: dict[str, int] = {}
+    for i in own_instances(model):
+        texts = bytes(model.plugin_attr[model.plugin_attradr[i] :]).split(b"\0")
+        rule = read_side_rule(texts[SIDE_RULE_PLACE] if len(texts) > SIDE_RULE_PLACE else b"")
+        rules[mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i)] = rule
+    return rules.get(PLUGIN_INSTANCE, min(rules.values(), default=0) if len(set(rules.values())) == 1 else 0)
+
+
+def read_side_rule(text: bytes) -> int:
+    """Return the side rule in a configuration; a model from before it was stored has that of MuJoCo 3."""
+    return 4 if text == b"4" else 3
 
 
 def driving_instances(model: mujoco.MjModel) -> list[int]:

@@ -10,23 +10,27 @@ from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
 from mjwrap.mjcf.inside import reference_pose, shares_inside
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
+from mjwrap.mjcf.side_rules import choose_side_rule
 from mjwrap.mjcf.tuples import read_tuple
 from mjwrap.muscles.laws import ActuatorForce
 
 OBJ = mujoco.mjtObj
 
 
-def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> Declarations:
+def read_declarations(
+    model: mujoco.MjModel, *, transmission: bool = False, side_rule: int | None = None
+) -> Declarations:
     """Read every muscle that a model declares, in the order of its actuators, then of tuples without an actuator.
 
     transmission: MuJoCo computes the forces of its own muscles (`ActuatorForce`) and of all other actuators on spatial
-    tendons, which then count as muscles too. Raises `ModelError` for a wrong declaration. Native muscle actuators, or
-    other actuators, that mjwrap cannot take over stay with MuJoCo and are listed in `native`.
+    tendons, which then count as muscles too. side_rule: of the tendons' side sites, see `choose_side_rule`. Raises
+    `ModelError` for a wrong declaration. Native muscle actuators, or other actuators, that mjwrap cannot take over stay
+    with MuJoCo and are listed in `native`.
     """
     if not hasattr(model, "nactuator"):
         raise VersionError(f"mjwrap needs MuJoCo 3.11 or newer, this is {mujoco.__version__}")
-    rest = reference_pose(model)
-    by_actuator, free = _read_tuples(model, rest, transmission)
+    rest, rule = reference_pose(model), choose_side_rule(model, side_rule)
+    by_actuator, free = _read_tuples(model, rest, transmission, rule)
     muscles: list[MuscleDeclaration] = []
     native: dict[str, str] = {}
     for actuator in range(model.nactuator):
@@ -35,7 +39,7 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
         elif is_muscle(model, actuator) or (transmission and pulled_tendon(model, actuator) >= 0):
             reason = (path_reason if transmission else native_reason)(model, rest, actuator)
             if reason is None:
-                muscles.append(_read_native(model, rest, actuator, transmission))
+                muscles.append(_read_native(model, rest, actuator, transmission, rule))
             else:
                 native[name_of(model, OBJ.mjOBJ_ACTUATOR, actuator)] = reason
     for muscle, reason in _mostly_inside(model, [m for m in muscles if m.actuator not in by_actuator]):
@@ -49,11 +53,11 @@ def read_declarations(model: mujoco.MjModel, *, transmission: bool = False) -> D
                 f"the same muscle, list the actuator in the tuple"
             )
         taken.append(muscle.name)
-    return Declarations(muscles + free, native)
+    return Declarations(muscles + free, native, rule)
 
 
 def _read_tuples(
-    model: mujoco.MjModel, rest: mujoco.MjData, transmission: bool
+    model: mujoco.MjModel, rest: mujoco.MjData, transmission: bool, side_rule: int
 ) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
     """Return the muscles of all mjwrap tuples: by actuator, and those without one."""
     by_actuator: dict[int, MuscleDeclaration] = {}
@@ -63,7 +67,7 @@ def _read_tuples(
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
         if "mjwrap" not in tuple_name:
             continue
-        muscle = read_tuple(model, rest, index, transmission)
+        muscle = read_tuple(model, rest, index, transmission, side_rule)
         if muscle.actuator < 0:
             free.append(muscle)
         elif muscle.actuator in by_actuator:
@@ -103,13 +107,12 @@ def _mostly_inside(
 
 
 def _read_native(
-    model: mujoco.MjModel, rest: mujoco.MjData, actuator: int, transmission: bool
+    model: mujoco.MjModel, rest: mujoco.MjData, actuator: int, transmission: bool, side_rule: int
 ) -> MuscleDeclaration:
     name, tendon = name_of(model, OBJ.mjOBJ_ACTUATOR, actuator), pulled_tendon(model, actuator)
     try:
         law = ActuatorForce() if transmission else mujoco_law(model, actuator)
     except ModelError as error:
         raise ModelError(f"muscle '{name}': {error}") from None
-    return MuscleDeclaration(
-        name, build_routes(model, name, tendon_stops(model, rest, tendon)), law, actuator, tendon
-    )
+    stops = tendon_stops(model, rest, tendon, side_rule)
+    return MuscleDeclaration(name, build_routes(model, name, stops), law, actuator, tendon)

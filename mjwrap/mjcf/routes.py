@@ -11,6 +11,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.declarations import Node, Route
 from mjwrap.mjcf.inside import end_is_inside, is_beside, side_is_inside
 from mjwrap.mjcf.names import listed, name_of, names
+from mjwrap.mjcf.side_rules import AUTHORS, reference_turn
 from mjwrap.mjcf.wrapping_geoms import read_surface, wrapping_geoms
 
 OBJ = mujoco.mjtObj
@@ -20,7 +21,7 @@ class Stop(NamedTuple):
     """One element of a list of stops: id of a site, geom, hint (a site) or sizes (a numeric), or a pulley's divisor.
 
     finite: a cylinder geom has the length with which it is drawn, not an infinite one. inside: the string must meet the
-    geom's solid.
+    geom's solid. turn: of a hint, see `Node`.
     """
 
     kind: Literal["site", "geom", "hint", "sizes", "pulley"]
@@ -28,6 +29,7 @@ class Stop(NamedTuple):
     divisor: float = 1.0
     finite: bool = False
     inside: bool = False
+    turn: float = 0.0
 
 
 class _Place(NamedTuple):
@@ -38,11 +40,16 @@ class _Place(NamedTuple):
     finite: bool = False
     inside: bool = False
     hint: int = -1
+    turn: float = 0.0
     sizes: int = -1
 
 
-def tendon_stops(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> list[Stop]:
-    """Return the stops of a spatial tendon. poses: any, with kinematics.
+def tendon_stops(
+    model: mujoco.MjModel, poses: mujoco.MjData, tendon: int, side_rule: int = AUTHORS
+) -> list[Stop]:
+    """Return the stops of a spatial tendon. poses: the reference pose; any, if the side sites do not matter.
+
+    side_rule: the rule by which its side sites pick the way round cylinders at the reference pose.
 
     A string is held inside a geom if the side site is inside and stays there, or if one of its ends does: MuJoCo's path
     is straight then, and so is the shortest one that meets the solid.
@@ -65,6 +72,9 @@ def tendon_stops(model: mujoco.MjModel, poses: mujoco.MjData, tendon: int) -> li
         for end in ends:
             held = held or (is_beside(model, place, end) and end_is_inside(model, poses, place, end))
         stops[geom] = stops[geom]._replace(inside=held)
+        if side >= 0 and side_rule != AUTHORS and not held:
+            turn = reference_turn(model, poses, place, side, ends, side_rule)
+            stops[geom + 1] = stops[geom + 1]._replace(turn=turn)
     return stops
 
 
@@ -118,7 +128,7 @@ def _completed(model: mujoco.MjModel, muscle: str, place: _Place | None, stop: S
     """Return a geom's place with a hint or sizes added."""
     if place is not None and place.geom >= 0:
         if stop.kind == "hint" and place.hint < 0:
-            return place._replace(hint=stop.index)
+            return place._replace(hint=stop.index, turn=stop.turn)
         if stop.kind == "sizes" and place.sizes < 0:
             return place._replace(sizes=stop.index)
     before = _describe(model, place) if place else "nothing"
@@ -139,7 +149,12 @@ def _node(model: mujoco.MjModel, muscle: str, place: _Place) -> Node:
     except ModelError as error:
         raise ModelError(f"muscle '{muscle}': {error}") from None
     return Node(
-        geom=place.geom, hint_site=place.hint, surface=surface, inside=place.inside, sizes=place.sizes
+        geom=place.geom,
+        hint_site=place.hint,
+        surface=surface,
+        inside=place.inside,
+        sizes=place.sizes,
+        turn=place.turn,
     )
 
 

@@ -23,6 +23,7 @@ from mjwrap.mjcf.parameters import (
     read_texts,
 )
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
+from mjwrap.mjcf.side_rules import AUTHORS
 from mjwrap.mjcf.wrapping_geoms import size_keys
 
 OBJ = mujoco.mjtObj
@@ -44,12 +45,17 @@ class _Elements:
 
 
 def read_tuple(
-    model: mujoco.MjModel, rest: mujoco.MjData, index: int, transmission: bool = False
+    model: mujoco.MjModel,
+    rest: mujoco.MjData,
+    index: int,
+    transmission: bool = False,
+    side_rule: int = AUTHORS,
 ) -> MuscleDeclaration:
     """Return the muscle that a tuple declares; `ModelError`, which names the tuple or muscle and the element, if wrong.
 
     rest: kinematics of the reference pose. transmission: under the law "mujoco" MuJoCo computes the force, of any
-    actuator on a spatial tendon.
+    actuator on a spatial tendon. side_rule: of the side sites of a tendon whose route the tuple takes; the hints that
+    the tuple itself lists are the author's, and nothing changes their meaning.
     """
     tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
     try:
@@ -70,7 +76,7 @@ def read_tuple(
     if not stops:
         if tendon < 0:
             raise ModelError(f"tuple '{tuple_name}': it has neither sites nor a tendon with sites")
-        stops = tendon_stops(model, rest, tendon)
+        stops = tendon_stops(model, rest, tendon, side_rule)
     routes = build_routes(model, name, stops)
     try:
         given = read_numerics(model, found.numerics)

@@ -95,7 +95,9 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 def kernel_rows(node: Node) -> list[Array]:
     """Return the kernels' rows of a stop, for a cold start; several if a string may touch its surface several times."""
     if node.surface is not None:
-        return list(surface_rows(node.surface, node.inside))
+        rows = surface_rows(node.surface, node.inside)
+        rows[:, layout.HINT_TURN] = node.turn
+        return list(rows)
     row = np.zeros(layout.ROW)
     row[layout.KIND], row[layout.S_MODE] = layout.VIA, layout.COLD
     return [row]

@@ -94,7 +94,7 @@ class PathSolution(Derivatives):
         node = self._node.copy()
         hinted_sides.mark_unmet_hints(*self._ends, node)
         met = np.ones(len(self.contacts), dtype=np.bool_)
-        met[self._owner[node[:, layout.W_UNMET] > 0.0]] = False
+        met[self._owner[node[:, layout.HINT] == layout.UNMET_HINT]] = False
         return [bool(value) for value in met]
 
     @property

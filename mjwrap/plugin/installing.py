@@ -10,6 +10,7 @@ import mujoco
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model, with_remedy
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
+from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
@@ -34,7 +35,9 @@ from mjwrap.plugin.spec.undo import undone_on_error
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
 
 
-def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False) -> mujoco.MjModel:
+def install(
+    spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False, side_rule: int | None = None
+) -> mujoco.MjModel:
     """Add the engine plugin to an MjSpec, and compile a model whose `mj_step` runs the muscles.
 
     The spec itself is changed, so that it can be compiled again, attached and saved: it gets an instance of the
@@ -48,25 +51,30 @@ def install(spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = F
             act by wrenches.
         keep_tendons: let MuJoCo also compute tendons that only declare the route of a muscle; by default the returned
             model leaves them out.
+        side_rule: whose rule picks, at the reference pose, the way round a cylinder that the side site of a tendon
+            means: 3 for MuJoCo 3's, 4 for MuJoCo 4's. None: the rule of an earlier install of this spec, else that of
+            the running MuJoCo. The model keeps it, also when it is saved and opened with another MuJoCo.
 
     Returns:
         The compiled model.
 
     Raises:
-        ModelError: the muscles cannot be read, or MuJoCo cannot store the moment of a path.
+        ModelError: the muscles cannot be read, MuJoCo cannot store the moment of a path, or there is no such mode or
+            rule.
         VersionError: the layout of the installed MuJoCo could not be verified.
     """
     if not isinstance(spec, mujoco.MjSpec):
         raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
     if mode not in MODES:
         raise ModelError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
+    check_side_rule(side_rule)
     register()
     with undone_on_error(spec):
-        return _installed(spec, mode, keep_tendons)
+        return _installed(spec, mode, keep_tendons, side_rule)
 
 
-def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjModel:
-    _remove_earlier(spec, mode)
+def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: int | None) -> mujoco.MjModel:
+    rule = _remove_earlier(spec, mode, side_rule)
     model = _compile(spec)
     if int(model.opt.disableflags) & _BOTH_OFF == _BOTH_OFF:
         raise ModelError(
@@ -75,8 +83,8 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjM
     marks.zero_disabled_ranges(model)
     with Takeover(model).original_limits():
         attached = [configuration_of(element) for element in spec_instances(spec)]
-        taken = {name: each.mode for each in attached for name in each.muscles}
-        declared = _declared(model, mode, taken)
+        taken = {name: (each.mode, each.side_rule) for each in attached for name in each.muscles}
+        declared = _declared(model, (mode, rule), taken)
         muscles = [muscle for muscle in declared if muscle.name not in taken]
         if not muscles and not taken:
             raise ModelError(
@@ -84,39 +92,47 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool) -> mujoco.MjM
             )
         disable_actuators(spec, model, muscles)
     names = [muscle.name for muscle in muscles]
-    plan, muscles = read_muscles(model, names, mode)
+    plan, muscles = read_muscles(model, names, mode, rule)
     check_moment_columns(model, plan, muscles)
     if drawing():
         hide_tendons(spec, muscles)
     prevent_sleep(spec, model, loaded_bodies(plan))
-    add_instance(spec, configuration_texts(names, state_size(plan), mode))
+    add_instance(spec, configuration_texts(names, state_size(plan), mode, rule))
     model = _compile(spec)
     if not keep_tendons:
         remove_unneeded_tendons(model, declared)
     return model
 
 
-def _remove_earlier(spec: mujoco.MjSpec, mode: str) -> None:
-    """Undo an earlier install for the spec's own muscles, so that they are read again."""
+def _remove_earlier(spec: mujoco.MjSpec, mode: str, side_rule: int | None) -> int:
+    """Undo an earlier install for the spec's own muscles, so that they are read again; return the side rule to use."""
+    rule = side_rule or running_side_rule()
     for element in spec_instances(spec):
         if element.name != PLUGIN_INSTANCE:
             continue  # the instance of an attached model
-        for name in configuration_of(element).muscles:
+        earlier = configuration_of(element)
+        for name in earlier.muscles:
             enable_actuator(spec, name)
             show_tendon(spec, name)
-        element.config = configuration_texts([], 1, mode)
+        rule = side_rule or earlier.side_rule
+        element.config = configuration_texts([], 1, mode, rule)
+    return rule
 
 
-def _declared(model: mujoco.MjModel, mode: str, taken: dict[str, str]) -> list[MuscleDeclaration]:
-    """Return the muscles of a model, each read for its mode: the mode of an attached model, or the new mode.
+def _declared(
+    model: mujoco.MjModel, new: tuple[str, int], taken: dict[str, tuple[str, int]]
+) -> list[MuscleDeclaration]:
+    """Return the muscles of a model, each read for its mode and side rule: those of an attached model, or new ones.
 
-    taken: modes of the muscles of attached models, by name.
+    taken: mode and side rule of the muscles of attached models, by name.
     """
     return [
         muscle
-        for kind in dict.fromkeys([mode, *taken.values()])
-        for muscle in read_declarations(model, transmission=kind == TRANSMISSION).muscles
-        if taken.get(muscle.name, mode) == kind
+        for kind in dict.fromkeys([new, *taken.values()])
+        for muscle in read_declarations(
+            model, transmission=kind[0] == TRANSMISSION, side_rule=kind[1]
+        ).muscles
+        if taken.get(muscle.name, new) == kind
     ]
 
 
@@ -134,7 +150,11 @@ def _hint(spec: mujoco.MjSpec, mode: str) -> str:
 
 
 def load(
-    path: str | os.PathLike[str], mode: str | None = None, *, keep_tendons: bool = False
+    path: str | os.PathLike[str],
+    mode: str | None = None,
+    *,
+    keep_tendons: bool = False,
+    side_rule: int | None = None,
 ) -> mujoco.MjModel:
     """Load an MJCF file and `install` the engine plugin, or load an MJB file of a model that has the plugin.
 
@@ -142,26 +162,34 @@ def load(
         path: the file.
         mode: as in `install`; "wrench" if None. An MJB file has its own mode.
         keep_tendons: as in `install`; only for MJCF files.
+        side_rule: as in `install`; an MJB file has its own rule.
 
     Returns:
         The compiled model.
 
     Raises:
-        ModelError: as in `install`, or the file cannot be loaded, or an MJB file has another mode.
+        ModelError: as in `install`, or the file cannot be loaded, or an MJB file has another mode or rule.
         VersionError: the layout of the installed MuJoCo could not be verified.
     """
+    check_side_rule(side_rule)
     register()
     model = read_model(path)
     renumber(model)
     if Path(path).suffix != ".mjb":
         spec = mujoco.MjSpec.from_file(os.fspath(path))
-        return install(spec, mode or WRENCH, keep_tendons=keep_tendons)
+        return install(spec, mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
     instances = own_instances(model)
-    modes = {configuration_at(model._address, i).mode for i in instances}
+    saved = [configuration_at(model._address, i) for i in instances]
+    modes, rules = {each.mode for each in saved}, {each.side_rule for each in saved}
     if instances and mode is not None and modes != {mode}:
         raise ModelError(
             f"{path} was saved with mode '{', '.join(sorted(modes))}', and an MJB file cannot be changed; leave out "
             f"mode '{mode}', or load its XML"
+        )
+    if instances and side_rule is not None and rules != {side_rule}:
+        raise ModelError(
+            f"{path} was saved with side_rule {', '.join(str(rule) for rule in sorted(rules))}, and an MJB file cannot "
+            f"be changed; leave out side_rule {side_rule}, or load its XML"
         )
     if not instances:
         raise ModelError(

@@ -13,6 +13,7 @@ from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import Declarations
+from mjwrap.mjcf.side_rules import choose_side_rule
 from mjwrap.plugin.blocks.instance_muscles import read_instances
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.readout import block_address, head_of, instances, transmit
@@ -39,7 +40,10 @@ class Muscles(Results):
         self._instances = instances(data.model)
         plan, muscles = read_instances(data.model._address, self._instances)
         super().__init__(
-            Declarations(muscles), plan, data.model, Evaluation(plan.n, plan.node, len(plan.routes))
+            Declarations(muscles, side_rule=choose_side_rule(data.model, None)),
+            plan,
+            data.model,
+            Evaluation(plan.n, plan.node, len(plan.routes)),
         )
         self._transmits = any(
             configuration_at(data.model._address, i).mode == TRANSMISSION for i in self._instances

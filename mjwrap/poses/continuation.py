@@ -9,7 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.poses.continuity import jump_candidates, refine_jump
+from mjwrap.mjcf.inside import reference_pose
+from mjwrap.poses.continuity import Smallest, jump_candidates, refine_jump, smallest_jumps
+from mjwrap.poses.sizes import muscle_size
+from mjwrap.poses.ties import moment_arm_break
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -27,9 +30,9 @@ class SweepTrace(NamedTuple):
     good: NDArray[np.bool_]
     branches: list[Array]
 
-    def jump_candidates(self, i: int) -> list[tuple[int, float | None]]:
+    def jump_candidates(self, i: int, least: Smallest) -> list[tuple[int, float | None]]:
         """Return the intervals in which muscle i may jump: it changes more than a smooth curve."""
-        return jump_candidates(self.at, self.length[:, i], self.slope[:, i], self.good[:, i])
+        return jump_candidates(self.at, self.length[:, i], self.slope[:, i], self.good[:, i], least)
 
 
 class PathFollower:
@@ -37,6 +40,8 @@ class PathFollower:
 
     def __init__(self, muscles: MuscleSystem, data: mujoco.MjData) -> None:
         self._muscles, self._data = muscles, data
+        rest = reference_pose(muscles.model)
+        self._sizes = [muscle_size(muscles.model, rest, muscle) for muscle in muscles.declarations]
 
     def move_to(self, start: Array, goal: Array, steps: int = 20) -> None:
         """Start cold at a pose (nq,), and move to another pose in small steps, on the branches of the first one."""
@@ -65,30 +70,39 @@ class PathFollower:
         return SweepTrace(at, length, slope, good, branches)
 
     def jumps(
-        self, place: Place, trace: SweepTrace, only: Iterable[int] | None = None
+        self, place: Place, trace: SweepTrace, turning: bool, only: Iterable[int] | None = None
     ) -> list[tuple[int, Found]]:
         """Return the jumps along a trace: muscle, and position, size in length [m] and size in slope.
 
-        only: the muscles to test, all if None. A possible jump is tested again in finer steps, as in a smooth motion: a
-        large step may end on another branch where two branches are close to each other.
+        turning: whether the swept joint turns; only: the muscles to test, all if None. A possible jump is tested again
+        in finer steps, as in a smooth motion: a large step may end on another branch where two branches are close to
+        each other.
         """
         span, found = float(np.ptp(trace.at)), list[tuple[int, Found]]()
         finer: dict[int, SweepTrace] = {}
         for i in range(self._muscles.n) if only is None else only:
-            for k, bend in trace.jump_candidates(i):
-                if self._refine(place, trace, i, k, bend, span) is None:
+            least = smallest_jumps(self._sizes[i], turning)
+            for k, bend in trace.jump_candidates(i, least):
+                if self._refine(place, trace, i, k, bend, span, least) is None:
                     continue
                 if k not in finer:
                     self._muscles.set_branch(self._data, trace.branches[k])
                     finer[k] = self.trace(place, np.linspace(trace.at[k], trace.at[k + 1], FINER + 1))
-                for j, turn in finer[k].jump_candidates(i):
-                    jump = self._refine(place, finer[k], i, j, turn, span)
+                for j, turn in finer[k].jump_candidates(i, least):
+                    jump = self._refine(place, finer[k], i, j, turn, span, least)
                     if jump and all(i != m or abs(jump[0] - other[0]) > 1e-6 * span for m, other in found):
                         found.append((i, jump))
         return found
 
     def _refine(
-        self, place: Place, trace: SweepTrace, i: int, k: int, bend: float | None, span: float
+        self,
+        place: Place,
+        trace: SweepTrace,
+        i: int,
+        k: int,
+        bend: float | None,
+        span: float,
+        least: Smallest,
     ) -> Found | None:
         def probe(at: float) -> tuple[float, float]:
             self._data.qpos[:], tangent = place(at)
@@ -96,7 +110,12 @@ class PathFollower:
             jacobian = self._muscles.length_jacobian(self._data)
             return float(self._muscles.length[i]), float(jacobian[i] @ tangent)
 
-        return refine_jump(probe, float(trace.at[k]), float(trace.at[k + 1]), span, bend)
+        return refine_jump(probe, float(trace.at[k]), float(trace.at[k + 1]), span, bend, least)
+
+    def moment_arm_break(self, place: Place, trace: SweepTrace, i: int, at: float) -> str:
+        """Return why muscle i has no continuous moment arm at a position, starting from the trace; empty if it has."""
+        self.touched(place, trace, i, at)
+        return moment_arm_break(self._muscles, self._data, i, self._sizes[i])
 
     def touched(self, place: Place, trace: SweepTrace, i: int, at: float) -> int:
         """Return the number of surfaces that muscle i touches at a position, starting from the trace."""

@@ -24,7 +24,7 @@ class PoseSequence:
     name: a joint's name, or "random poses"; at (T,): the joint's position [m or rad], or the index; qpos (T, nq);
     tangent (T, nv): d(pose)/d(at); qvel (T, nv): random velocities; continuous: whether the poses form a motion;
     base: the number of the pose around which a joint is swept; alone: whether a coupled joint is moved alone, which no
-    motion of the model does.
+    motion of the model does; turning: whether the swept joint turns.
     """
 
     name: str
@@ -35,6 +35,7 @@ class PoseSequence:
     continuous: bool
     base: int = 0
     alone: bool = False
+    turning: bool = True
 
 
 class PoseMaker:
@@ -125,7 +126,8 @@ class PoseMaker:
             name = f"{name} ({'xyz'[axis]})"
         qpos, tangent = (np.array(part) for part in zip(*pairs, strict=True))
         velocities, alone = self._velocities(samples), self.follows(joint)
-        return PoseSequence(name, at, qpos, tangent, velocities, True, self.number, alone)
+        turning = int(self.model.jnt_type[joint]) != _SLIDE
+        return PoseSequence(name, at, qpos, tangent, velocities, True, self.number, alone, turning)
 
     def maker(self, joint: int, axis: int = 0) -> Callable[[float], tuple[Array, Array]]:
         """Return the function value -> (pose, tangent) of a sweep, for positions between its samples."""

@@ -41,9 +41,9 @@ class Engine(Protocol):
 class PythonEngine:
     """A `MuscleSystem` that is stepped."""
 
-    def __init__(self, source: str, strict: bool) -> None:
+    def __init__(self, source: str, strict: bool, side_rule: int | None = None) -> None:
         self.model = load(source)
-        self.muscles = MuscleSystem(self.model, strict=strict)
+        self.muscles = MuscleSystem(self.model, strict=strict, side_rule=side_rule)
         self.data = self.sampled = mujoco.MjData(self.model)
 
     def step(self) -> None:
@@ -63,14 +63,17 @@ class PythonEngine:
 class PluginEngine:
     """Plain `mj_step` with the muscles in the engine plugin; a MuscleSystem on a second model computes the samples."""
 
-    def __init__(self, source: str, mode: str, strict: bool) -> None:
+    def __init__(self, source: str, mode: str, strict: bool, side_rule: int | None = None) -> None:
         from mjwrap import plugin
 
         self._read = plugin.read
         is_binary = source.lower().endswith(".mjb")  # cannot be changed, and may have the plugin already
-        self.model = plugin.load(source, mode) if is_binary else plugin.install(load_spec(source), mode)
+        if is_binary:
+            self.model = plugin.load(source, mode, side_rule=side_rule)
+        else:
+            self.model = plugin.install(load_spec(source), mode, side_rule=side_rule)
         self.data = mujoco.MjData(self.model)
-        self.muscles = MuscleSystem(load(source))
+        self.muscles = MuscleSystem(load(source), side_rule=side_rule)
         self.sampled = mujoco.MjData(self.muscles.model)
         self._strict = strict
         self._excitations = plugin.excitations(self.data)
@@ -123,12 +126,14 @@ class PluginEngine:
         return found
 
 
-def start_engine(source: str, mode: str, strict: bool) -> Engine:
+def start_engine(source: str, mode: str, strict: bool, side_rule: int | None = None) -> Engine:
     """Return the engine of a model (a file, or "myo_sim:NAME") for a mode of `MODES`.
 
     "python" is `MuscleSystem`; the others are modes of the plugin's `install`. strict: raise `PathError` at the first
-    step at which a muscle has no path.
+    step at which a muscle has no path. side_rule: as for `MuscleSystem` and `install`.
     """
     if mode not in MODES:
         raise ModelError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
-    return PythonEngine(source, strict) if mode == "python" else PluginEngine(source, mode, strict)
+    if mode == "python":
+        return PythonEngine(source, strict, side_rule)
+    return PluginEngine(source, mode, strict, side_rule)

@@ -39,6 +39,7 @@ class RunSettings:
         keyframe: name of the keyframe of the start; None for qpos0.
         positions: start positions of hinges and slides by name [rad, m].
         strict: raise `PathError` if a muscle's path cannot be found.
+        side_rule: as for `MuscleSystem` and `install`.
     """
 
     duration: float = 1.0
@@ -52,6 +53,7 @@ class RunSettings:
     keyframe: str | None = None
     positions: Mapping[str, float] = field(default_factory=dict)
     strict: bool = False
+    side_rule: int | None = None
 
 
 class WallTime(NamedTuple):
@@ -79,7 +81,7 @@ class Simulation:
 
     def __init__(self, source: str, settings: RunSettings, *, option: str = "") -> None:
         self.settings = settings
-        self.engine = engine = start_engine(source, settings.mode, settings.strict)
+        self.engine = engine = start_engine(source, settings.mode, settings.strict, settings.side_rule)
         self.muscles = engine.muscles
         for model in {id(m): m for m in (engine.model, engine.muscles.model)}.values():
             if settings.timestep is not None:

@@ -27,7 +27,7 @@ class Evaluator(Results):
 
     _last: State
 
-    def __init__(self, model: mujoco.MjModel, *, strict: bool = False) -> None:
+    def __init__(self, model: mujoco.MjModel, *, strict: bool = False, side_rule: int | None = None) -> None:
         if not isinstance(model, mujoco.MjModel):
             raise ModelError(
                 f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
@@ -40,7 +40,7 @@ class Evaluator(Results):
         self.strict = strict
         self._takeover = Takeover(model)
         with self._takeover.original_limits():
-            found = read_declarations(model)
+            found = read_declarations(model, side_rule=side_rule)
         plan = build_plan(model, found.muscles)
         super().__init__(found, plan, model, State(model, plan))
         self._takeover.disable([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
@@ -122,8 +122,13 @@ class Evaluator(Results):
             self._groups_off = off
 
     def _failed(self, state: State, poses: mujoco.MjData, data: mujoco.MjData) -> None:
-        """Note which muscles have no path; raise `PathError` if `strict` was given."""
+        """Note which muscles have no path, and what acts instead; raise `PathError` if `strict` was given."""
         bad = np.flatnonzero(state.status)
+        held = self.held
+        if held.any():
+            state.any_held = True
+            state.kept_now |= held & (state.length > 0.0)
+            state.forceless_now |= held & (state.length == 0.0)
         for i in bad:
             if state.last_failure[i] != state.status[i]:
                 inside = state.status[i] == Status.ENDPOINT_INSIDE

@@ -31,11 +31,21 @@ _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 class MuscleSystem(Evaluator):
     """Drive every muscle that a model declares along its geodesic path.
 
-    model: an `MjModel`. Muscle actuators that mjwrap takes over keep their activation dynamics but no longer pull:
-    their `actuator_forcerange` is zero until `release`. strict: raise `PathError` if a path cannot be found; otherwise
-    the muscle keeps its last valid force for that step. Raises `ModelError` if a declaration is wrong. The results
-    `length`, `velocity`, `tension`, `activation` and `status`, each (n,), are those of the last `forward`, `apply` or
-    `step`, at the state at which the forces acted. SI units; lengthening and tension are positive.
+    The results `length`, `velocity`, `tension`, `activation` and `status`, each (n,), are those of the last `forward`,
+    `apply` or `step`, at the state at which the forces acted. SI units; lengthening and tension are positive.
+
+    Args:
+        model: an `MjModel`. Muscle actuators that mjwrap takes over keep their activation dynamics but no longer pull:
+            their `actuator_forcerange` is zero until `release`.
+        strict: raise `PathError` if a path cannot be found; otherwise its length is continued from the surface, or its
+            last valid force is kept (`held`).
+        side_rule: whose rule picks, at the model's reference pose, the way round a cylinder that the side site of a
+            tendon means: 3 for MuJoCo 3's, 4 for MuJoCo 4's; None for the running MuJoCo's, or for that of the
+            `install` before `without_plugin`. Paths that start at other poses, or after `reset`, go round as if they
+            had come from the reference pose.
+
+    Raises:
+        ModelError: a declaration is wrong, or there is no such rule.
     """
 
     def forward(self, data: mujoco.MjData) -> None:
@@ -46,6 +56,7 @@ class MuscleSystem(Evaluator):
         """
         state = self._state(data)
         self._evaluate(state, self._refresh(state, data), data)
+        state.forget_held()  # this is no step
 
     def poses(self, data: mujoco.MjData) -> mujoco.MjData:
         """Return the data with the `xpos` and `xquat` at which the results were computed.
@@ -69,6 +80,7 @@ class MuscleSystem(Evaluator):
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
         state.applied = data.time
         state.failures += state.status != 0
+        state.count_held()
         wrenches.add_to_xfrc(
             data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench
         )
@@ -156,6 +168,7 @@ class MuscleSystem(Evaluator):
                     mujoco.mj_step1(self.model, data)
                     self._act(state, data, ahead=self.model.opt.timestep)
                     state.failures += state.status != 0
+                    state.count_held()
                     mujoco.mj_step2(self.model, data)
                     self._take_back(state, data)
                     if self._plan.integrates and resets(data) == before:
@@ -209,6 +222,7 @@ class MuscleSystem(Evaluator):
                 if caught:
                     raise caught[0]
                 state.failures += failed
+                state.count_held()
                 if self._plan.integrates and acted and resets(data) == before:
                     self._store(state, data)
 

@@ -27,13 +27,15 @@ _GEOM = mujoco.mjtObj.mjOBJ_GEOM
 class Results:
     """Lengths, velocities, tensions, statuses and paths at the last evaluation, as copies.
 
-    declarations: the declaration of each muscle; native: muscle actuators that stay with MuJoCo, with the reasons.
+    declarations: the declaration of each muscle; native: muscle actuators that stay with MuJoCo, with the reasons;
+    side_rule: by which the side sites of tendons pick the way round a cylinder, 3 or 4.
     """
 
     def __init__(self, found: Declarations, plan: Plan, model: mujoco.MjModel, last: Evaluation) -> None:
         self.model = model
         self.declarations: list[MuscleDeclaration] = found.muscles
         self.native: dict[str, str] = found.native
+        self.side_rule: int = found.side_rule
         self._plan = plan
         self._last = last
         self._root = np.asarray(model.body_rootid, dtype=np.int64)
@@ -127,7 +129,7 @@ class Results:
             ox, oy, oz = first[segments.G_A : segments.G_A + 3].tolist()
             ix, iy, iz = last[segments.G_B : segments.G_B + 3].tolist()
             hinted_sides.mark_unmet_hints(0, hi - lo, ox, oy, oz, ix, iy, iz, node)
-            geoms = plan.links[lo:hi, muscle_paths.L_GEOM][node[:, layout.W_UNMET] > 0.0]
+            geoms = plan.links[lo:hi, muscle_paths.L_GEOM][node[:, layout.HINT] == layout.UNMET_HINT]
             found += [name_of(self.model, _GEOM, int(geom)) for geom in geoms]
         return found
 

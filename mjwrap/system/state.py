@@ -60,6 +60,23 @@ class State(Evaluation):
         self.in_scratch = (
             False  # whether the last evaluation took its poses from there, not from the caller's data
         )
+        # what acted without a path: numbers of steps at which the last force was kept, and at which there was none yet
+        self.kept, self.forceless = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        self.kept_now, self.forceless_now = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        self.any_held = False  # in this step so far
+
+    def count_held(self) -> None:
+        """Count the muscles that kept a force at some evaluation of the step that ends, or had none to keep."""
+        if self.any_held:
+            self.kept += self.kept_now
+            self.forceless += self.forceless_now
+            self.forget_held()
+
+    def forget_held(self) -> None:
+        """Forget what the evaluations since the last step have kept."""
+        if self.any_held:
+            self.kept_now[:] = self.forceless_now[:] = False
+            self.any_held = False
 
     def forget(self) -> None:
         """Reset: no branch, no last force, no failures."""
@@ -68,4 +85,6 @@ class State(Evaluation):
         self.numbers[:], self.own[:] = 0.0, 0.0
         self.status[:] = 0
         self.failures[:] = 0
+        self.kept[:] = self.forceless[:] = 0
+        self.forget_held()
         self.evaluated, self.applied = False, None

@@ -26,6 +26,19 @@ def add_model(parser: argparse.ArgumentParser, keyframe: str, seed: str) -> None
     add("model", metavar="MODEL", help=MODEL_HELP)
     add("--keyframe", metavar="NAME", help=f"{keyframe} (default: {INITIAL_POSE})")
     add("--seed", type=at_least(0), default=0, metavar="N", help=f"{seed} (default %(default)s)")
+    add_side_rule(parser)
+
+
+def add_side_rule(parser: Any) -> None:
+    """Add the option --side-rule to a parser or group."""
+    parser.add_argument(
+        "--side-rule",
+        type=int,
+        choices=(3, 4),
+        metavar="3|4",
+        help="whose rule picks, at the reference pose, the way round a cylinder that the side site of a tendon means: "
+        "that of MuJoCo 3 or 4 (default: the running MuJoCo's, or the one that an installed model has stored)",
+    )
 
 
 def positive(text: str) -> float:

@@ -108,6 +108,7 @@ def settings(options: argparse.Namespace) -> CompareSettings:
         model=options.model,
         keyframe=options.keyframe,
         seed=options.seed,
+        side_rule=options.side_rule,
         muscles=options.muscles,
         samples=options.samples,
         bases=options.bases,

@@ -56,7 +56,7 @@ def write_page(
     page = _template().render(
         model=model,
         command=command,
-        versions=f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__}",
+        versions=f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__} (side rule {found.side_rule})",
         facts=_facts(found),
         outcomes=[
             {"title": TITLES[o], "colour": COLOURS[o], "poses": found.total(o)}

@@ -21,6 +21,7 @@ COLOURS = {
     Outcome.MJWRAP_WRONG: "#8f2d56",
     Outcome.UNEXPLAINED: "#000000",
     Outcome.WRONG_SIDE: "#f4b6c2",
+    Outcome.KINK: "#c9d99e",
 }
 NATIVE, OWN = (
     {"color": "tab:orange", "linewidth": 2.6, "alpha": 0.75},
@@ -64,7 +65,7 @@ def _telling(found: PoseComparison) -> list[MuscleSummary]:
         if s.curves.length is not None:
             gap = float(np.abs(s.curves.length - s.curves.native_length)[~s.curves.failed].max(initial=0.0))
         change = float(np.ptp(s.curves.native_length))
-        return gap if gap > AGREE else 0.0, jumps[s.name], change
+        return gap if gap > AGREE * s.size else 0.0, jumps[s.name], change
 
     drawn = [s for s in found.muscles.values() if s.curves is not None]
     return sorted(drawn, key=weight, reverse=True)[:SWEEPS]

@@ -52,7 +52,7 @@ class PoseRows:
     def _add(self, motion: PoseSequence, pair: MusclePair) -> None:
         native, mine = pair.native, pair.mjwrap
         assert mine is not None
-        found, gaps = outcomes(pair, motion.continuous), differences(native, mine)
+        found, gaps = outcomes(pair, motion), differences(native, mine)
         about, arms = _moment_arms(motion, pair, self._dofs)
         equal = found == Outcome.AGREE
         left_out = np.zeros(len(motion.at), dtype=np.bool_)
@@ -92,6 +92,7 @@ def _moment_arms(motion: PoseSequence, pair: MusclePair, dofs: list[str]) -> tup
     gap, size = np.abs(mine.jacobian - native.jacobian), np.abs(native.jacobian)
     if not gap.size:
         return [""] * count, np.zeros((2, count))
+    gap, size = gap / pair.arms, size / pair.arms
     place = np.where(gap.max(axis=1) > AGREE, gap.argmax(axis=1), size.argmax(axis=1))
     rows = np.arange(count)
     arms = -np.array([native.jacobian[rows, place], mine.jacobian[rows, place]])

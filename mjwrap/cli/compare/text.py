@@ -31,6 +31,7 @@ TITLES = {
     Outcome.MJWRAP_WRONG: "mjwrap wrong",
     Outcome.UNEXPLAINED: "unexplained",
     Outcome.WRONG_SIDE: "wrong side",
+    Outcome.KINK: "kink or tie",
 }
 Say = Callable[[str], object]
 
@@ -51,7 +52,7 @@ def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) ->
             say(f"  {name}: {right}: {why}" if right != "-" else f"  {name}: {why}")
     for name, why in found.left_out.items():
         say(f"  {name}: not compared: {why}")
-    far = [s for s in both if s.length.difference > AGREE]
+    far = [s for s in both if s.length.difference > AGREE * s.size]
     if far:
         say("\nlargest differences of length")
         for s in sorted(far, key=lambda s: -s.length.difference)[:10]:
@@ -153,6 +154,7 @@ def as_values(
     content: dict[str, Any] = {
         "mujoco": mujoco.__version__,
         "mjwrap": mjwrap.__version__,
+        "side_rule": found.side_rule,
         "poses": found.poses,
         "totals": {o.name.lower(): found.total(o) for o in Outcome},
         "muscles": {name: _muscle(s, verdicts[name]) for name, s in found.muscles.items()},

@@ -55,6 +55,7 @@ def settings(options: argparse.Namespace) -> InspectSettings:
         model=options.model,
         keyframe=options.keyframe,
         seed=options.seed,
+        side_rule=options.side_rule,
         ranges=ranges,
         quick=options.quick,
         strict=options.strict,

@@ -24,14 +24,16 @@ from mjwrap.text import counted
 class InspectSettings:
     """The settings of `mjwrap inspect`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the rest pose, None for qpos0. seed: of the random poses. ranges: of
-    joints by name, in place of the model's [rad, m]. quick: judge only the parameters and the rest pose. strict: exit
-    code 1 if something is implausible. json: a file for the report as values, "-" for standard output, or None.
+    model: a file, or "myo_sim:NAME". keyframe: the rest pose, None for qpos0. seed: of the random poses. side_rule: as
+    for `MuscleSystem`. ranges: of joints by name, in place of the model's [rad, m]. quick: judge only the parameters
+    and the rest pose. strict: exit code 1 if something is implausible. json: a file for the report as values, "-" for
+    standard output, or None.
     """
 
     model: str
     keyframe: str | None
     seed: int
+    side_rule: int | None
     ranges: Mapping[str, tuple[float, float]]
     quick: bool
     strict: bool
@@ -47,7 +49,7 @@ def inspect(settings: InspectSettings) -> int:
         copy.copy(model), rest, joints
     )  # read first, so that a mistake in a range is reported before the work
     report = Report(settings.json)
-    muscles = MuscleSystem(model)
+    muscles = MuscleSystem(model, side_rule=settings.side_rule)
     if not muscles.names and not muscles.native:
         raise UserError("the model has no muscles: nothing to inspect")
     report.say(
@@ -68,6 +70,7 @@ def inspect(settings: InspectSettings) -> int:
     report.say(found.table())
     values: dict[str, Any] = {
         "model": settings.model,
+        "side_rule": muscles.side_rule,
         "muscles": [as_values(model, muscle) for muscle in muscles.declarations],
         "native": muscles.native,
         "unmet_hints": unmet,

@@ -28,6 +28,7 @@ from mjwrap.cli.common.arguments import (
     add_json,
     add_recording,
     add_serving,
+    add_side_rule,
     read_kinds,
     recording_settings,
 )
@@ -53,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"keyframe for values missing from the table (default: {INITIAL_POSE})",
     )
+    add_side_rule(states)
     add_recording(states, states)
     states.add_argument("--out", metavar="FILE", help="write the computed paths and forces as a table")
     states.add_argument(
@@ -74,7 +76,9 @@ def settings(options: argparse.Namespace) -> ReplaySettings:
     """Convert the arguments to settings; raises `UserError` if they contradict each other."""
     is_table = Path(options.file).suffix.lower() in SUFFIXES
     for option in (
-        () if is_table else ("model", "keyframe", "record", "connect", *RECORDING_DETAILS, "out", "analysis")
+        ()
+        if is_table
+        else ("model", "keyframe", "side_rule", "record", "connect", *RECORDING_DETAILS, "out", "analysis")
     ):
         if getattr(options, option):
             raise UserError(
@@ -106,6 +110,7 @@ def _states(options: argparse.Namespace) -> StatesSettings:
     return StatesSettings(
         model=options.model,
         keyframe=options.keyframe,
+        side_rule=options.side_rule,
         recording=recording_settings(options, recorded, "--record or --connect"),
         table=options.out,
         kinds=read_kinds(options.columns),

@@ -34,7 +34,7 @@ def recompute(
     """
     model = load(settings.model)
     data = start_state(model, start_keyframe(model, settings.keyframe))
-    muscles = MuscleSystem(model)
+    muscles = MuscleSystem(model, side_rule=settings.side_rule)
     states = read_states(model, muscles, data, read_table(file))
     report = Report(json)
     failures = np.zeros(muscles.n, dtype=np.int64)

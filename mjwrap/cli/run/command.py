@@ -150,6 +150,7 @@ def settings(options: argparse.Namespace) -> RunCommandSettings:
         keyframe=options.keyframe,
         positions=_positions(options.qpos),
         strict=options.strict,
+        side_rule=options.side_rule,
     )
     port = options.port if options.serve else None
     return RunCommandSettings(options.model, run_settings, outputs, serve_port=port, json=options.json)

@@ -28,7 +28,7 @@ from mjwrap.kernels.wraps.search import hint_is_behind, hint_outside
 from mjwrap.kernels.wraps.single import sweep_asked_for, wrap
 
 HINT, POS, SIZE, S_MODE, S_ARC = lay.HINT, lay.POS, lay.SIZE, lay.S_MODE, lay.S_ARC
-W_P, W_Q, W_BEST, W_UNMET = lay.W_P, lay.W_Q, lay.W_BEST, lay.W_UNMET
+W_P, W_Q, W_BEST, UNMET_HINT = lay.W_P, lay.W_Q, lay.W_BEST, lay.UNMET_HINT
 
 ATTEMPTS = 4  # largest number of times that obstacles are wrapped anew
 SAME = 1e-9  # paths whose lengths differ by a smaller share are the same
@@ -148,13 +148,13 @@ def _is_met(k, lo, hi, ends, node):
 
 @jit
 def _mark_span(lo, hi, ends, node):
-    """Write to W_UNMET which hints the path over lo..hi does not meet; return how many."""
+    """Write to the flags HINT which hints the path over lo..hi does not meet; return how many."""
     count = 0
     for k in range(lo, hi):
-        node[k, W_UNMET] = 0.0
-        if node[k, HINT] > 0.0 and node[k, lay.INSIDE] == 0.0 and not _is_met(k, lo, hi, ends, node):
-            node[k, W_UNMET] = 1.0
-            count += 1
+        if node[k, HINT] > 0.0 and node[k, lay.INSIDE] == 0.0:
+            met = _is_met(k, lo, hi, ends, node)
+            node[k, HINT] = 1.0 if met else UNMET_HINT
+            count += 0 if met else 1
     return count
 
 
@@ -167,7 +167,7 @@ def _wrap_by_hints(lo, hi, ends, node, all_sides):
     for _ in range(PASSES):
         x, y, z = ends[3], ends[4], ends[5]
         for k in range(lo, hi):
-            if node[k, W_UNMET] > 0.0 or (all_sides and node[k, HINT] > 0.0 and branched(k, node)):
+            if node[k, HINT] == UNMET_HINT or (all_sides and node[k, HINT] > 0.0 and branched(k, node)):
                 for j in range(k, surface_end(k, hi, node)):
                     remove_contact(j, node)
                 node[k, S_MODE] = lay.COLD
@@ -181,7 +181,7 @@ def _wrap_by_hints(lo, hi, ends, node, all_sides):
 
 @deferred(types.int64)
 def mark_unmet_hints(lo, hi, ox, oy, oz, ix, iy, iz, node):
-    """Write to W_UNMET which hints the path over nodes lo..hi does not meet; return how many.
+    """Write to the flags HINT which hints the path over nodes lo..hi does not meet; return how many.
 
     The rows hold the last evaluation of a path from (ox, oy, oz) to (ix, iy, iz), world [m].
     """
@@ -192,7 +192,6 @@ def mark_unmet_hints(lo, hi, ox, oy, oz, ix, iy, iz, node):
             continue
         bx, by, bz = ix - ox, iy - oy, iz - oz
         if k < hi:
-            node[k, W_UNMET] = 0.0
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
         count += _mark_span(start, k, (ox, oy, oz, ax, ay, az, bx, by, bz), node)
         ax, ay, az = bx, by, bz

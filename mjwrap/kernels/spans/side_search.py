@@ -34,6 +34,7 @@ KIND, SIZE, HINT = lay.KIND, lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_ARC
 W_Q, W_OLD = lay.W_Q, lay.W_OLD
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
+RANDOM_HINT = lay.RANDOM_HINT
 
 # a winding angle below which a string is on the shorter side already [rad]
 LEAST_FLIPPED_SWEEP = 0.5 * math.pi
@@ -52,7 +53,6 @@ GROUP_NEIGHBOURS = 2  # obstacles on each side of a group that are wrapped again
 PATTERNS = 12  # number of random patterns of hints where the row is a single group
 PATTERNS_PER_GROUP = 8  # number of random patterns for each group of a longer row
 EXTRA_PATTERNS = 4  # factor on these numbers while there is no path, or none in range
-RANDOM_HINT = 2.0  # value of the flag HINT that marks a random hint, so that it can be removed
 UNTOUCHED_CHANCE = 0.25  # probability that a pattern leaves an obstacle untouched
 
 

@@ -86,7 +86,7 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
 
     Where the straight string does not enter the cylinder and its point nearest to the axis lies on that side, it stays
     straight. Otherwise the way round whose middle is nearer to the hint is taken, also if it is the longer one, unless
-    it crosses itself. MuJoCo has the same rule for side sites (`mju_wrap` in engine_util_misc.c).
+    it crosses itself.
     """
     other = asked_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, radius)
     if other == principal:
@@ -157,7 +157,10 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     if _hinted(k, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
-        sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
+        if node[k, lay.HINT_TURN] != 0.0:
+            sweep = unwrap_angle(sweep, node[k, lay.HINT_TURN])
+        else:
+            sweep = _hinted_sweep(ax, ay, bx, by, sweep, alpha_a, alpha_b, hint_x, hint_y, radius)
     # angle of the arc: the swept angle minus the angles of the straight tangents
     arc = abs(sweep) - tangents_sweep(root_a, root_b, radius)
     if arc <= LEAST_BEND:

@@ -17,7 +17,7 @@ from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import into_frame, turn_into_frame
 from mjwrap.kernels.geometry.traits import closed_form
-from mjwrap.kernels.geometry.winding import tangents_sweep
+from mjwrap.kernels.geometry.winding import tangents_sweep, unwrap_angle
 from mjwrap.kernels.wraps.ruled import (
     A_INSIDE,
     B_INSIDE,
@@ -162,6 +162,8 @@ def sweep_asked_for(k, node, ax, ay, az, bx, by, bz):
     root_a = math.sqrt(max(px * px + py * py - radius_a * radius_a, 0.0))
     root_b = math.sqrt(max(qx * qx + qy * qy - radius_b * radius_b, 0.0))
     principal = math.atan2(px * qy - py * qx, px * qx + py * qy)
+    if node[k, lay.HINT_TURN] != 0.0:
+        return unwrap_angle(principal, node[k, lay.HINT_TURN])
     return asked_sweep(
         px, py, qx, qy, principal, math.atan2(root_a, radius_a), math.atan2(root_b, radius_b),
         node[k, HINT + 1] / a, node[k, HINT + 2] / b, radius,

@@ -29,7 +29,9 @@ class Copy(NamedTuple):
     muscles: list[MuscleDeclaration]
 
 
-def read_muscles(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Plan, list[MuscleDeclaration]]:
+def read_muscles(
+    model: mujoco.MjModel, names: list[str], mode: str, side_rule: int
+) -> tuple[Plan, list[MuscleDeclaration]]:
     """Return the named muscles of a model and their arrays; `ModelError` if one is missing.
 
     Undoes the changes of `install` in `model`, except for the disabled actuators.
@@ -37,7 +39,7 @@ def read_muscles(model: mujoco.MjModel, names: list[str], mode: str) -> tuple[Pl
     marks.zero_disabled_ranges(model)
     restore_tendons(model)
     with Takeover(model).original_limits():
-        found = read_declarations(model, transmission=mode == TRANSMISSION).muscles
+        found = read_declarations(model, transmission=mode == TRANSMISSION, side_rule=side_rule).muscles
     declared = {muscle.name: muscle for muscle in found}
     missing = [name for name in names if name not in declared]
     if missing:
@@ -73,6 +75,7 @@ def _read_copy(address: int, configuration: Configuration) -> Copy:
     _here.reading = True
     try:
         model = copy_of(address)
-        return Copy(model, *read_muscles(model, configuration.muscles, configuration.mode))
+        names, _, mode, side_rule = configuration
+        return Copy(model, *read_muscles(model, names, mode, side_rule))
     finally:
         _here.reading = False

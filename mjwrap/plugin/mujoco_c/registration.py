@@ -8,7 +8,8 @@ from typing import Any
 from mjwrap.plugin.mujoco_c.library import MjpPlugin, library
 
 PLUGIN_NAME = "mjwrap.muscles"  # of the engine plugin
-ATTRIBUTES = MUSCLES, NUMBERS, MODE = "muscles", "numbers", "mode"  # of its configuration: texts in the model
+# names of the texts of its configuration, which the model keeps in this order (`mjcf/marks.py` reads the fourth)
+ATTRIBUTES = MUSCLES, NUMBERS, MODE, SIDE_RULE = "muscles", "numbers", "mode", "side_rule"
 _PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC
 
 
