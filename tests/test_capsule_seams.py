@@ -1,4 +1,4 @@
-"""Capsules crossed lengthwise: Newton's method gets over the seams, where the curvature jumps, at a cold start and warm."""
+"""Capsules crossed lengthwise: Newton's method gets over the seams, where the curvature jumps, cold and warm."""
 
 from __future__ import annotations
 
@@ -40,6 +40,18 @@ def test_a_capsule_crossed_lengthwise_has_a_path_without_hints(spread: float) ->
         check_path(origin, insertion, row, path)
 
 
+def moved(
+    start: mw.PathSolution, row: list[mw.Obstacle], origin: Array, insertion: Array, shifts: Array, steps: int
+) -> list[mw.PathSolution]:
+    """Return the paths of a straight motion of both ends in equal steps, the start's included."""
+    found = [start]
+    for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
+        found.append(
+            mw.solve_path(origin + share * shifts[0], insertion + share * shifts[1], row, start=found[-1])
+        )
+    return found
+
+
 def test_a_warm_move_over_the_seams_does_not_depend_on_its_steps() -> None:
     """Where a path follows the motion without a jump, 1 to 100 steps of straight motions end on it."""
     rng, followed = np.random.default_rng(32), 0
@@ -51,23 +63,12 @@ def test_a_warm_move_over_the_seams_does_not_depend_on_its_steps() -> None:
             continue
         shifts = rng.normal(size=(2, 3)) * capsule.radius * 0.8
 
-        def moved(
-            steps: int, start: mw.PathSolution = start, shifts: Array = shifts
-        ) -> list[mw.PathSolution]:
-            path, found = start, [start]
-            for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
-                path = mw.solve_path(
-                    origin + share * shifts[0], insertion + share * shifts[1], row, start=path
-                )  # noqa: B023
-                found.append(path)
-            return found
-
-        fine = moved(400)
+        fine = moved(start, row, origin, insertion, shifts, 400)
         jumps = np.abs(np.diff([path.length for path in fine], 2)).max()
         if jumps > 1e-6 or not all(path.converged for path in fine):
             continue
         followed += 1
         for steps in (1, 2, 5, 20, 100):
-            last = moved(steps)[-1]
+            last = moved(start, row, origin, insertion, shifts, steps)[-1]
             assert last.converged
             assert last.length == pytest.approx(fine[-1].length, abs=1e-11)

@@ -1,4 +1,4 @@
-"""Elliptic cylinders of any aspect, against mpmath: arcs, geodesics, paths and their tangency, windings that are kept."""
+"""Elliptic cylinders of any aspect, against mpmath: arcs, geodesics, paths, tangency; windings that are kept."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def turned(path: mw.PathSolution, turns: int) -> Array:
 
 @pytest.mark.parametrize("aspect", ASPECTS)
 def test_lengths_are_exact_and_tangency_is_within_the_stated_bound(aspect: float) -> None:
-    """|e - t| <= 1e-10 + δ (1 / λ + κ), with exact tangents at the contact points that the path has (docs/derivation.md)."""
+    """|e - t| <= 1e-10 + δ (1 / λ + κ), with exact tangents at the path's contact points (docs/derivation.md)."""
     rng, touched = np.random.default_rng(12), 0
     with mp.workdps(DIGITS):
         while touched < CASES:

@@ -46,7 +46,7 @@ def is_below_contact(k, at_p, x, y, z, node):
 
 @jit
 def set_pull_at_end(j, k, at_p, node, base, seg):
-    """Make segment j the force between the surface of row k and an end inside it, acting at the end: e = (I + h W)^-1 t.
+    """Make segment j the force between row k's surface and an end inside it, acting at the end: e = (I + h W)^-1 t.
 
     at_p: the end is the string's first point, next to P, else its last one, next to Q. e is not a unit vector but minus
     the gradient of the length with respect to the end; see `spans/end_inside.py`.
@@ -107,10 +107,10 @@ def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
         # an end that a rounded number has put below the surface on which it lies
         to_surface = k < hi and node[k, lay.KIND] != lay.VIA
         from_surface = near >= lo and node[near, lay.KIND] != lay.VIA
-        if to_surface and not from_surface and size <= lay.AS_WRITTEN * node[k, lay.SIZE]:
-            if is_below_contact(k, True, x, y, z, node):
+        if to_surface and not from_surface:
+            if size <= lay.AS_WRITTEN * node[k, lay.SIZE] and is_below_contact(k, True, x, y, z, node):
                 set_pull_at_end(count, k, True, node, (ox, oy, oz), seg)
-        elif from_surface and not to_surface and size <= lay.AS_WRITTEN * node[near, lay.SIZE]:
+        elif from_surface and not to_surface and size <= lay.AS_WRITTEN * node[near, lay.SIZE]:  # noqa: SIM102
             if is_below_contact(near, False, px, py, pz, node):
                 set_pull_at_end(count, near, False, node, (ox, oy, oz), seg)
         count += 1

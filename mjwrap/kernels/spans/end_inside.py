@@ -18,8 +18,8 @@ An end that is as little inside as a number written with six digits may put it (
 substitute path is the path, and its status CONVERGED.
 
 Deeper inside there is no substitute on a surface whose wraps have to be searched for: ellipsoid, capsule, torus, user's
-surface. In tests the wraps from two neighbouring F were on different sides in some of 10,000 small steps, and in many with both
-ends inside one capsule. See "An end inside a surface" in docs/derivation.md.
+surface. In tests the wraps from two neighbouring F were on different sides in some of 10,000 small steps, and in many
+with both ends inside one capsule. See "An end inside a surface" in docs/derivation.md.
 """
 
 from __future__ import annotations

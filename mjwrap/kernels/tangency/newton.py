@@ -231,7 +231,7 @@ def _row_at_end_on_surface(lo, hi, node):
 
 @no_inline
 def _aim_at_end_on_surface(k, lo, hi, ends, node, square):
-    """Aim Q of row k at the end of the path if that has moved on the surface; return (k, ||f||^2), or -1 for k if not."""
+    """Aim Q of row k at the end of the path if that has moved on the surface; return (k, or -1 if not, and ||f||^2)."""
     if not _moved_on_surface(k, node[k, lay.W_LQ], ends, 6, node):
         return -1, square
     node[k, lay.W_END_TARGET] = 1.0
