@@ -122,7 +122,7 @@ def nearest(x, y, z):
         along = dx * nx + dy * ny + dz * nz
         dx, dy, dz = dx - along * nx, dy - along * ny, dz - along * nz
         off = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if not off > 1e-9 * SIZE:
+        if not off > 1e-13 * SIZE:
             break
         dx, dy, dz = dx / off, dy / off, dz / off
         nx, ny, nz, kappa, tau, beta, _ = shape(px, py, pz, dx, dy, dz)
@@ -139,7 +139,8 @@ def nearest(x, y, z):
             u, v = share * ahead, share * aside
             qx, qy, qz, good = onto(px + u * dx + v * bx, py + u * dy + v * by, pz + u * dz + v * bz)
             far = (x - qx) ** 2 + (y - qy) ** 2 + (z - qz) ** 2
-            if good and far < square:
+            # close to the end a step shortens the distance by less than its rounding
+            if good and (far < square or off < 1e-6 * SIZE):
                 px, py, pz, moved = qx, qy, qz, True
                 break
             share *= 0.5

@@ -129,10 +129,9 @@ def nearest(x, y, z):
         rx, ry, rz, xu, yu, zu, xv, yv, zv, xuu, yuu, zuu, xuv, yuv, zuv, xvv, yvv, zvv = chart(p, q)
         dx, dy, dz = rx - x, ry - y, rz - z
         square = dx * dx + dy * dy + dz * dz
-        if not square < best:
+        # close to the end a step shortens the distance by less than its rounding
+        if not square < best and (abs(su) > 1e-6 * STRIDE_U or abs(sv) > 1e-6 * STRIDE_V):
             su, sv = 0.5 * su, 0.5 * sv
-            if abs(su) <= 1e-9 * STRIDE_U and abs(sv) <= 1e-9 * STRIDE_V:
-                break
             continue
         u, v, best = p, q, square
         e = xu * xu + yu * yu + zu * zu
