@@ -72,7 +72,7 @@ def scene(rng: np.random.Generator, aspect: float) -> tuple[Array, Array, mw.Obs
     ends = []
     while len(ends) < 2:
         x = rng.normal(size=3) * np.array([a, b, 0.02]) * rng.uniform(1.2, 4.0)
-        if (x[0] / a) ** 2 + (x[1] / b) ** 2 > 1.1:
+        if (x[0] / a) ** 2 + (x[1] / b) ** 2 > 1.5:
             ends.append(x)
     return ends[0], ends[1], mw.Obstacle(mw.EllipticCylinder((a, b)))
 
@@ -137,7 +137,7 @@ def test_a_wound_string_keeps_its_winding_however_the_motion_is_cut() -> None:
             continue
         moved += 1
         size = min(obstacle.surface.dims[:2])
-        shifts, twist = rng.normal(size=(2, 3)) * 0.3 * size, rng.normal(size=3) * size
+        shifts, twist = rng.normal(size=(2, 3)) * 0.03 * size, rng.normal(size=3) * 0.2 * size
         lengths = []
         for steps in (1, 2, 3, 10, 100):
             path = start

@@ -13,6 +13,7 @@ from numba.core import types
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
+from mjwrap.kernels.geometry.capsule_seams import slide_over_seam, way_over_shaft
 from mjwrap.kernels.geometry.clearance import (
     bounded_part,
     lowest_in_quadric,
@@ -20,14 +21,7 @@ from mjwrap.kernels.geometry.clearance import (
     lowest_over_cone,
     part_between,
 )
-from mjwrap.kernels.geometry.closed_forms import (
-    capsule,
-    cone,
-    cylinder,
-    slide_over_seam,
-    sphere,
-    way_over_shaft,
-)
+from mjwrap.kernels.geometry.closed_forms import capsule, cone, cylinder, sphere
 from mjwrap.kernels.geometry.elliptic_cylinder import elliptic_cylinder
 from mjwrap.kernels.geometry.projection import (
     height_over_capsule,
