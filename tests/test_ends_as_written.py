@@ -7,6 +7,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import mjwrap as mw
 from mjwrap.cli.inspect.declared import table
@@ -17,7 +18,7 @@ CASES = 50
 Vector = tuple[float, ...]
 
 
-def six(values: object) -> Vector:
+def six(values: ArrayLike) -> Vector:
     """Return numbers as a file with six digits has them."""
     return tuple(float(f"{x:.6g}") for x in np.ravel(values))
 

@@ -112,7 +112,8 @@ def test_lengths_are_exact_and_tangency_is_within_the_stated_bound(aspect: float
                 continue
             touched += 1
             check_path(origin, insertion, [obstacle], path)
-            sides = obstacle.surface.dims[:2]
+            a, b = obstacle.surface.dims[:2]
+            sides = a, b
             exact = exact_length(origin, insertion, sides, path.branch[0, 1])
             assert abs(mp.mpf(path.length) / exact - 1) < 4e-15
             contact = path.contacts[0]

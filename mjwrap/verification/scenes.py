@@ -148,8 +148,8 @@ def random_surface(rng: np.random.Generator, letter: str, largest: float = 1.0) 
             return mw.Cone(bottom, rng.uniform(0.2, 0.8) * bottom, rng.uniform(0.08, 0.2))
         case "L":
             long = size(0.01, 0.05)
-            sides = (long, long / float(np.exp(rng.uniform(np.log(5.0), np.log(100.0)))))
-            return mw.EllipticCylinder(sides if rng.random() < 0.5 else sides[::-1])
+            short = long / float(np.exp(rng.uniform(np.log(5.0), np.log(100.0))))
+            return mw.EllipticCylinder((long, short) if rng.random() < 0.5 else (short, long))
         case "p":
             return mw.Capsule(size(0.01, 0.04), size(0.01, 0.05))
     raise ValueError(f"surface letter must be one of {LETTERS}, not {letter!r}")
