@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import mpmath as mp
@@ -21,6 +23,7 @@ from mjwrap.verification.scenes import check_path
 Array = NDArray[np.float64]
 ASPECTS = (1.0, 1.5, 7.0, 20.0, 50.0, 100.0, 1000.0)
 DIGITS = 40
+CASE = Path(__file__).resolve().parents[2] / "shared" / "cases" / "30_wound_elliptic_cylinder" / "move.json"
 CASES = 50
 
 
@@ -152,3 +155,20 @@ def test_a_wound_string_keeps_its_winding_however_the_motion_is_cut() -> None:
             lengths.append(path.length)
         assert max(lengths) - min(lengths) < 1e-13
         assert abs(path.branch[0, 1] - start.branch[0, 1]) < 1.5
+
+
+@pytest.mark.skipif(not CASE.is_file(), reason="needs the shared cases beside the checkout")
+def test_the_case_of_a_wound_string_is_kept_in_any_number_of_steps() -> None:
+    """Wound 1.5 turns over aspect 7; it was lost in 1, 3, 10 and 100 steps (0.3008 m) and kept in 2 (0.4325 m)."""
+    case, lengths = json.loads(CASE.read_text()), []
+    surface = mw.EllipticCylinder((case["dims"][0], case["dims"][1]))
+    for poses in case["steps"].values():
+        path: Any = np.array(case["start_branch"])
+        for pose in poses:
+            row = [mw.Obstacle(surface, pose["pos"][0], pose["quat"][0], case["hint"])]
+            path = mw.solve_path(pose["origin"], pose["insertion"], row, start=path)
+            assert path.converged
+        lengths.append(path.length)
+    assert len(lengths) >= 5
+    assert lengths == pytest.approx([0.4325] * len(lengths), abs=5e-5)
+    assert np.ptp(lengths) < 1e-10
