@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import inlined, jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, inlined, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import height, project
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.geometry.projection import into_frame
@@ -60,7 +62,7 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
     moved = True
     while moved and not terminate(square, iterations, tol, max_iterations):
         if seamed:
-            moved, square, i, e = _step_with_seams(lo, hi, ends, node, square)
+            moved, square, i, e = step_with_seams(lo, hi, ends, node, square)
         else:
             moved, square, i, e = step(lo, hi, ends, node, square, False)
         iterations += i
@@ -238,8 +240,8 @@ def _aim_at_end_on_surface(k, lo, hi, ends, node, square):
     return k, _evaluate(lo, hi, ends, node)
 
 
-@no_inline
-def _step_with_seams(lo, hi, ends, node, square):
+@deferred(types.boolean, types.float64, types.int64, types.int64)
+def step_with_seams(lo, hi, ends, node, square):
     """Take the same step where a touched surface has seams: a copy of its own, so that other paths are as fast."""
     return step(lo, hi, ends, node, square, True)
 
