@@ -143,12 +143,15 @@ def test_a_server_that_is_ended_leaves_nobody_behind(
         port = probe.getsockname()[1]
     command = [sys.executable, "-m", "mjwrap", "replay", str(tmp_path / "run.rrd"), "--serve"]
     with subprocess.Popen([*command, "--port", str(port)], stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
-        address = server.stdout.readline().split()[-1]
-        until(lambda: answers(address), "the server answers")
-        number = getattr(signal, name)
-        server.send_signal(number)
-        assert server.wait(timeout=20) == 128 + number
+        try:
+            assert server.stdout is not None
+            address = server.stdout.readline().split()[-1]
+            until(lambda: answers(address), "the server answers")
+            number = getattr(signal, name)
+            server.send_signal(number)
+            assert server.wait(timeout=20) == 128 + number
+        finally:
+            server.terminate()  # without it a failure would wait for the server without end
     until(lambda: not answers(address), "the server is gone")
 
 
