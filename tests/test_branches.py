@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import mujoco
@@ -12,6 +13,12 @@ import mjwrap as mw
 from mjwrap.plugin import install
 
 CASES = 8000
+DRUM = """<mujoco><worldbody><site name="o" pos="-.3 .03 0"/>
+<geom name="w" type="cylinder" size=".1 .2" contype="0" conaffinity="0"/>
+<body name="b" pos=".3 0 0"><joint type="slide" axis="1 0 0" damping="1000"/>
+<geom size=".01" mass="1" contype="0" conaffinity="0"/><site name="i"/></body></worldbody>
+<tendon><spatial name="m"><site site="o"/><geom geom="w"/><site site="i"/></spatial></tendon>
+<actuator><muscle name="m" tendon="m" lengthrange=".5 1"/></actuator></mujoco>"""
 # Rows in which a trial left NaN in a row that the path does not touch (a small input of each kind of ending).
 FOUND = {
     "of no length": (
@@ -120,3 +127,42 @@ def test_states_of_the_plugin_and_of_a_system_are_finite() -> None:
     data = mujoco.MjData(installed)
     mujoco.mj_step(installed, data, nstep=3)
     assert np.isfinite(data.plugin_state).all()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_branch_that_is_not_finite_is_refused_and_one_in_plugin_state_starts_cold(value: float) -> None:
+    spec = mujoco.MjSpec.from_string(DRUM)
+    model = spec.compile()
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    muscles.forward(data)
+    length = muscles.length[0]
+    with pytest.raises(mw.StateError, match="finite"):
+        muscles.set_branch(data, np.full(len(muscles.branch(data)), value))
+    path = mw.solve_path((-0.3, 0.0, 0.0), (0.3, 0.0, 0.0), [mw.Obstacle(mw.Cylinder(0.1))])
+    with pytest.raises(mw.GeometryError, match="NaN or infinite"):
+        mw.solve_path(
+            (-0.3, 0.0, 0.0),
+            (0.3, 0.0, 0.0),
+            [mw.Obstacle(mw.Cylinder(0.1))],
+            start=np.full_like(path.branch, value),
+        )
+    installed = mw.install(spec)
+    there = mujoco.MjData(installed)
+    mujoco.mj_step(installed, there)
+    saved = there.plugin_state.copy()
+    for k in range(len(saved) - 40, len(saved)):
+        there.plugin_state[:] = saved
+        there.plugin_state[k] = value
+        mujoco.mj_step(installed, there)
+        assert mw.plugin.Muscles(there).length[0] == pytest.approx(length, abs=1e-5)
+        mujoco.mj_step(installed, there)
+        assert np.isfinite(there.plugin_state).all()
+
+
+def test_a_rotation_of_any_length_is_a_rotation() -> None:
+    ends = (-0.3, 0.01, 0.0), (0.3, 0.01, 0.0)
+    expected = mw.solve_path(*ends, [mw.Obstacle(mw.Cylinder(0.1), quat=(1.0, 0.5, 0.0, 0.0))]).length
+    for size in (1e-300, 1e-200, 1e-3, 1e200):
+        path = mw.solve_path(*ends, [mw.Obstacle(mw.Cylinder(0.1), quat=(size, 0.5 * size, 0.0, 0.0))])
+        assert path.converged
+        assert path.length == pytest.approx(expected, rel=1e-14)

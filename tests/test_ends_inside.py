@@ -224,3 +224,21 @@ def test_energy_is_kept_through_the_surface_and_the_plugin_moves_alike(geom: str
     assert np.ptp(energies) < 2e-5 * 3.0 * np.ptp(lengths)  # the force has a cusp at the surface
     assert np.array_equal(data.qpos, twin.qpos)
     assert read(twin).failures[0] == muscles.failures[0] > 0
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [mw.Ellipsoid((0.05, 0.02, 0.05)), mw.Ellipsoid((0.05, 0.034, 0.05)), mw.EllipticCylinder((0.05, 0.02)),
+     mw.EllipticCylinder((0.05, 0.034))],
+)  # fmt: skip
+def test_nothing_jumps_where_the_nearest_point_changes_sides(surface: Any) -> None:
+    """Half way to the middle plane of a flat solid the substitute path ends; the length is held from there."""
+    last, sol, held = None, None, 0
+    for y in np.linspace(0.019, -0.019, 761):
+        sol = mw.solve_path((-0.005, y, 0.003), (0.3, 0.1, 0.02), [mw.Obstacle(surface)], start=sol)
+        known = sol.converged or sol.tangency_error < NO_SUBSTITUTE
+        held += not known
+        if known and last is not None:
+            assert abs(sol.length - last) < 2.0 * 5e-5, y
+        last = sol.length if known else None
+    assert held > 50

@@ -181,3 +181,32 @@ def test_a_hint_on_the_outer_side_threads_nothing(sides: tuple[float, float]) ->
     path = mw.solve_path(origin, insertion, [mw.Obstacle(mw.Torus(0.05, 0.01), hint=(0.062, 0.0, 0.0))])
     assert path.converged
     assert crossings(path, 0.05) == 0
+
+
+@pytest.mark.parametrize("surface", [mw.Capsule(0.02, 0.05), mw.Ellipsoid((0.03, 0.02, 0.06))])
+def test_a_hint_on_the_surface_is_met_where_the_shortest_path_meets_it(surface: Any) -> None:
+    """At 0.9 % of such starts over the capsule the search took a longer path on the other side."""
+    rng, asked = np.random.default_rng(8), 0
+    for _ in range(1500):
+        pos = rng.normal(size=3) * 0.01
+        a, b = rng.uniform(-0.03, 0.03, (2, 3)) + np.array([[-0.14, 0.0, 0.04], [0.12, 0.0, 0.04]])
+        azimuth, z = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(-0.04, 0.04)
+        extent = surface.dims[:2] if isinstance(surface, mw.Ellipsoid) else (0.02, 0.02)
+        hint = (extent[0] * math.cos(azimuth), extent[1] * math.sin(azimuth), z)
+        row = [mw.Obstacle(surface, tuple(pos), hint=hint)]
+        free = mw.solve_path(a, b, [mw.Obstacle(surface, tuple(pos))])
+        if not mw.solve_path(a, b, row, start=free.branch).hints_met[0]:
+            continue
+        asked += 1
+        path = mw.solve_path(a, b, row)
+        assert path.converged
+        assert path.hints_met == [True]
+    assert asked > 200
+
+
+def test_a_hint_on_a_capsule_does_not_lead_to_the_longer_side() -> None:
+    ends = (-0.1424619, -0.0260868, 0.0497277), (0.12, 0.0032596, 0.0358394)
+    pos, hint = (-0.001087, 0.0071409, 0.0062382), (-0.0073353, -0.0190356, -0.0060848)
+    path = mw.solve_path(*ends, [mw.Obstacle(mw.Capsule(0.02, 0.05), pos, hint=hint)])
+    twin = mw.solve_path(*ends, [mw.Obstacle(mw.Cylinder(0.02), pos, hint=hint)])
+    assert path.length == pytest.approx(twin.length, abs=1e-12)  # it touches the cylindrical part only

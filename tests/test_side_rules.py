@@ -279,7 +279,10 @@ def test_an_installed_model_keeps_its_rule(rule: int, tmp_path: Path) -> None:
     )
     parent.attach(spec, prefix="left_", frame=parent.worldbody.add_frame())
     assert length(parent.compile()) == expected
-    assert length(mw.install(parent, side_rule=7 - rule)) == expected  # the attached model's own rule
+    together = mw.install(parent, side_rule=7 - rule)
+    assert length(together) == expected  # the attached model's own rule
+    assert mw.plugin.Muscles(mujoco.MjData(together)).side_rule == rule
+    assert length_at(without_plugin(together)) == expected
 
 
 def test_a_model_from_before_rules_were_stored_has_mujoco_3s() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
+from mjwrap.kernels import layout
 from mjwrap.surfaces import Surface
 from mjwrap.verification.scenes import (
     LETTERS,
@@ -87,7 +88,9 @@ def test_an_end_point_that_sinks_into_a_surface_has_a_status_and_a_length(letter
         last = outside
         for depth in (1e-9, 1e-6, 2e-3):
             last = mw.solve_path(foot - depth * normal, insertion, [obstacle], start=last if warm else None)
-            assert last.status == mw.Status.ENDPOINT_INSIDE
+            # an end that six digits may have put inside lies on the surface
+            on_it = depth < layout.AS_WRITTEN * obstacle.surface.size
+            assert last.status == (mw.Status.CONVERGED if on_it else mw.Status.ENDPOINT_INSIDE)
             assert np.isfinite(last.length)
             assert np.isfinite(last.wrenches(1.0)).all()
             if depth == 1e-9:

@@ -114,6 +114,7 @@ def _derivatives(
     units = np.where(turning_dofs(model) & (length[:, None] > 0.0), length[:, None], 1.0)
     size = np.maximum((np.abs(jacobian) / units).max(axis=1, initial=0.0), LEAST)
     full = np.maximum(np.abs(jacobian) @ np.abs(data.qvel), LEAST * (units @ np.abs(data.qvel)))
+    full[full == 0.0] = 1.0  # a model without joints does not move
     speed.see(extrapolated_error(around.central(data.qvel.copy()), velocity) / full, where, muscles.names)
     found = []
     for d, dof in enumerate(dof_names(model)):

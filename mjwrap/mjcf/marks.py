@@ -207,10 +207,13 @@ def set_idle(model: mujoco.MjModel, instance: int) -> None:
 def stored_side_rule(model: mujoco.MjModel) -> int:
     """Return the side rule (`mjcf/side_rules.py`) that `install` stored in a model; 0 without one.
 
-    Of several instances the model's own counts; those of attached models count if they agree.
+    Of several instances that drive muscles, or did, the model's own counts; those of attached models count if they
+    agree.
     """
     rules: dict[str, int] = {}
     for i in own_instances(model):
+        if not model.plugin_attr[model.plugin_attradr[i]]:
+            continue
         texts = bytes(model.plugin_attr[model.plugin_attradr[i] :]).split(b"\0")
         rule = read_side_rule(texts[SIDE_RULE_PLACE] if len(texts) > SIDE_RULE_PLACE else b"")
         rules[mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, i)] = rule

@@ -67,6 +67,9 @@ class Obstacle:
         object.__setattr__(self, "quat", vector(self.quat, 4, "Obstacle: quat"))
         if not any(self.quat):
             raise GeometryError("Obstacle: quat must not be zero")
+        largest = max(abs(x) for x in self.quat)
+        if not 1e-100 < largest < 1e100:  # its square would not be a number
+            object.__setattr__(self, "quat", tuple(x / largest for x in self.quat))
         if self.hint is not None:
             object.__setattr__(self, "hint", vector(self.hint, 3, "Obstacle: hint"))
         if self.inside and not (self.surface.held_about and math.isinf(self.surface.z_limit)):

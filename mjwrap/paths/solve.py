@@ -20,11 +20,12 @@ def _start(start: PathSolution | Array | None, node: Array) -> None:
     if start is None:
         return
     if isinstance(start, np.ndarray):
-        if start.shape != (len(node), layout.STATE) or not np.isfinite(start).all():
+        if start.shape != (len(node), layout.STATE):
             raise GeometryError(
-                f"start must be a finite branch of shape ({len(node)}, {layout.STATE}) for these obstacles, "
-                f"not {start.shape}"
+                f"start must be a branch of shape ({len(node)}, {layout.STATE}) for these obstacles, not {start.shape}"
             )
+        if not np.isfinite(start).all():
+            raise GeometryError("start must be a finite branch; this one has NaN or infinite numbers")
         node[:, SAVED] = start
         return
     if not isinstance(start, PathSolution):

@@ -250,13 +250,15 @@ class MuscleSystem(Evaluator):
         return np.append(state.node[:, layout.S_MODE : layout.S_MODE + layout.STATE], state.own)
 
     def set_branch(self, data: mujoco.MjData, branch: ArrayLike) -> None:
-        """Restore what `branch` returned, also for another MjData of the model; `StateError` if its size is wrong."""
+        """Restore what `branch` returned, also for another MjData of the model; else `StateError`."""
         state = self._state(data)
         given, rows = np.asarray(branch, dtype=np.float64), state.node[:, layout.S_MODE :][:, : layout.STATE]
         if given.shape != (rows.size + state.own.size,):
             raise StateError(
                 f"branch must have shape ({rows.size + state.own.size},) as branch() returns it, not {given.shape}"
             )
+        if not np.isfinite(given).all():
+            raise StateError("branch must be finite, as branch() returns it")
         rows[:] = given[: rows.size].reshape(rows.shape)
         state.own[:] = given[rows.size :].reshape(state.own.shape)
 

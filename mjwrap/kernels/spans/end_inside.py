@@ -11,8 +11,8 @@ these paths is taken. The gradient has a kink, of the order of the depth, where 
 
 Let W be the shape operator at F and h < 0 the height of A. Along the surface, A = F + h n moves by (I + h W) dF, so
 that the gradient with respect to A is -(I + h W)^-1 t. As a force e it acts between A's body and the surface's body, at
-A. It grows without bound where the nearest point is not unique, at an axis or a centre; so the path from F is used down
-to half of that depth only.
+A. It grows without bound at an axis or a centre, and F jumps where another surface point gets nearer; so the path from
+F is used down to half of that depth only.
 
 An end that is as little inside as a number written with six digits may put it (AS_WRITTEN) lies on the surface: its
 substitute path is the path, and its status CONVERGED.
@@ -108,6 +108,23 @@ def _is_too_deep(k, point, normal, curvature, ends, column, node):
 
 
 @jit
+def _is_past_half_way(k, ends, column, node):
+    """Return whether an end lies deeper inside obstacle k than half way to where another surface point gets nearer.
+
+    Twice as deep, straight below the nearest point of the end, that point is not the nearest one any more.
+    """
+    x, y, z = into_frame(
+        node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
+    )
+    px, py, pz = nearest(node, k, x, y, z)
+    dx, dy, dz = 2.0 * (x - px), 2.0 * (y - py), 2.0 * (z - pz)
+    x, y, z = px + dx, py + dy, pz + dz
+    qx, qy, qz = nearest(node, k, x, y, z)
+    far = (x - qx) ** 2 + (y - qy) ** 2 + (z - qz) ** 2
+    return far < (dx * dx + dy * dy + dz * dz) * (1.0 - 1e-9)
+
+
+@jit
 def _lift_all(lo, hi, node):
     """Remove the contacts of rows lo..hi; their saved sides stay."""
     for k in range(lo, hi):
@@ -180,9 +197,16 @@ def substitute_path(lo, hi, ends, node, tol, direct):
         status = lay.CONVERGED
     restore_solutions(lo, hi, ends, node, lay.W_START)
     k, j = _first_and_last_contact(lo, hi, node)
-    if a >= 0 and a <= k < behind and _is_too_deep(k, lay.W_P, lay.W_NP, lay.W_KP, ends, 3, node):
-        error = NO_SUBSTITUTE
-    if b >= 0 and j >= b and _is_too_deep(j, lay.W_Q, lay.W_NQ, lay.W_KQ, ends, 6, node):
+    deep = False
+    if a >= 0 and a <= k < behind and not shallow:
+        deep = _is_too_deep(k, lay.W_P, lay.W_NP, lay.W_KP, ends, 3, node) or _is_past_half_way(
+            a, ends, 3, node
+        )
+    if b >= 0 and j >= b and not shallow and not deep:
+        deep = _is_too_deep(j, lay.W_Q, lay.W_NQ, lay.W_KQ, ends, 6, node) or _is_past_half_way(
+            b, ends, 6, node
+        )
+    if deep:
         error = NO_SUBSTITUTE
     return best, error, iterations, evaluations
 

@@ -24,6 +24,7 @@ from mjwrap.kernels.geometry.dispatch import (
     winding_angle,
 )
 from mjwrap.kernels.geometry.geodesics import geodesic
+from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided
 from mjwrap.kernels.geometry.winding import unwrap_angle
@@ -49,6 +50,7 @@ from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, INSIDE, set_free
 
 SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
+W_P, W_Q = lay.W_P, lay.W_Q
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 NEAR_HINT = 5  # half planes within 60 degrees of the hint
@@ -161,6 +163,20 @@ def wrap_by_search(k, ends, node, search):
 
 
 @jit
+def _is_towards(k, node, fx, fy, fz, wx, wy, wz):
+    """Return whether the contact of the last evaluation lies in the direction w from the point F, in S."""
+    x, y, z = (
+        node[k, W_Q] - node[k, W_P],
+        node[k, W_Q + 1] - node[k, W_P + 1],
+        node[k, W_Q + 2] - node[k, W_P + 2],
+    )
+    x, y, z = turn_into_frame(node, k, x, y, z)
+    # half way from P to Q
+    x, y, z = node[k, S_P] + 0.5 * x - fx, node[k, S_P + 1] + 0.5 * y - fy, node[k, S_P + 2] + 0.5 * z - fz
+    return x * wx + y * wy + z * wz >= 0.0
+
+
+@jit
 def hint_outside(k, node):
     """Return row k's hint, or the surface point nearest to it where it lies inside the surface."""
     x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
@@ -208,7 +224,7 @@ def _search(
 ):
     """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found.
 
-    most: number of half planes to try. Returns whether a path was found.
+    most: number of half planes to try. Returns whether a path was found, with a hint one on its side.
     """
     # u along AB; w perpendicular to it, from AB's lowest point towards the hint or along the normal; v = u x w
     ux, uy, uz = dx / size, dy / size, dz / size
@@ -232,7 +248,7 @@ def _search(
     if most < DIRECTIONS:
         above = length + node[k, SIZE]
     found, best, fresh = False, 0.0, -1
-    guessed = False
+    guessed, sided = False, False
     j = 0
     # the best solution so far, then the first guess
     memory = carray(stack(), (80,))
@@ -257,14 +273,18 @@ def _search(
             for i in range(lay.STATE):
                 memory[lay.STATE + i] = node[k, S_MODE + i]
         good, total = polish_from_low_ends(k, ends, node, high_a, high_b)
-        if not good or not _on_branch(k, node, branch, before) or (found and total >= best * (1.0 - 1e-12)):
+        if not good or not _on_branch(k, node, branch, before):
             continue
-        found, best, fresh = True, total, j
+        # one on the hint's side is better than one that is not, then the shorter one
+        there = not hinted or hollow(k, node) or _is_towards(k, node, fx, fy, fz, wx, wy, wz)
+        if found and (sided or not there) and ((sided and not there) or total >= best * (1.0 - 1e-12)):
+            continue
+        found, best, fresh, sided = True, total, j, there
         node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
         for i in range(lay.STATE):
             memory[i] = node[k, S_MODE + i]
         # the first is nearest to the hint, or to the side that was lost; without either take the shortest
-        if hinted or not cold:
+        if (hinted and there) or not cold:
             break
     # from low ends: all geodesics whose tangents lead to the other end
     if not found or (cold and not hinted):
@@ -296,7 +316,7 @@ def _search(
     node[k, S_MODE] = TOUCHED
     # if the best one was the last that was tried, the row still holds its evaluation
     if found and fresh == j:
-        return found
+        return sided or not hinted
     node[k, lay.W_WRAP_ERROR] = -1.0
     if found or guessed:
         start = 0 if found else lay.STATE
@@ -305,4 +325,4 @@ def _search(
     else:
         place_contact(k, node, fx, fy, fz, ux, uy, uz, 0.0)
     geodesic(k, node, ends[0], ends[1], ends[2])
-    return found
+    return found and (sided or not hinted)

@@ -8,10 +8,13 @@ so that a state made by hand works like one that MuJoCo has reset.
 
 from __future__ import annotations
 
+import math
+
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.coupling.muscle_paths import L_GEOM, R_HI, R_LO, R_SURFACES, ROUTE
 from mjwrap.kernels.solved import segments as sg
 from mjwrap.kernels.spans.end_inside import has_valid_length
+from mjwrap.kernels.spans.saved_solutions import discard_invalid_solutions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import float64_array, int64_array, read_int64
@@ -69,9 +72,13 @@ def load(block, state):
         for k in range(route[c, R_LO], route[c, R_HI]):
             if links[k, L_GEOM] < 0:
                 continue
-            node[k, lay.S_MODE] = state[at] + lay.COLD
+            total = state[at]
+            node[k, lay.S_MODE] = total + lay.COLD
             for i in range(1, lay.STATE):
+                total += state[at + i]
                 node[k, lay.S_MODE + i] = state[at + i]
+            if not math.isfinite(total):  # the user may have written to plugin_state
+                discard_invalid_solutions(k, k + 1, node)
             for i in range(4):
                 node[k, lay.HINT + i] = state[at + lay.STATE + i]
             at += SAVED
