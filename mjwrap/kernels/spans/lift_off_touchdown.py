@@ -10,7 +10,7 @@ from __future__ import annotations
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.dispatch import segment_clearance, winding_angle
-from mjwrap.kernels.geometry.geodesics import geodesic
+from mjwrap.kernels.geometry.geodesics import geodesic, move_start_along
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import branched, hollow
 from mjwrap.kernels.geometry.winding import unwrap_angle
@@ -133,25 +133,13 @@ def split_at_hollow(lo, hi, ends, node):
             node[k, S_ARC] = arc
             geodesic(k, node, ends[0], ends[1], ends[2])
             continue
-        # the first sample behind the hollow is where the second contact starts, in S
-        node[k, S_ARC] = arc * (last + 1) / HOLLOW_SAMPLES
-        geodesic(k, node, ends[0], ends[1], ends[2])
-        x, y, z = (
-            node[k, W_Q] - node[k, W_P],
-            node[k, W_Q + 1] - node[k, W_P + 1],
-            node[k, W_Q + 2] - node[k, W_P + 2],
-        )
-        x, y, z = turn_into_frame(node, k, x, y, z)
-        tx, ty, tz = turn_into_frame(node, k, node[k, lay.W_TQ], node[k, lay.W_TQ + 1], node[k, lay.W_TQ + 2])
+        # the second contact starts at the first sample behind the hollow
         node[k + 1, S_MODE] = TOUCHED
-        node[k + 1, S_P] = node[k, S_P] + x
-        node[k + 1, S_P + 1] = node[k, S_P + 1] + y
-        node[k + 1, S_P + 2] = node[k, S_P + 2] + z
-        node[k + 1, lay.S_T] = tx
-        node[k + 1, lay.S_T + 1] = ty
-        node[k + 1, lay.S_T + 2] = tz
+        for i in range(6):
+            node[k + 1, S_P + i] = node[k, S_P + i]
+        node[k + 1, S_ARC] = arc
+        move_start_along(k + 1, node, ends, arc * (last + 1) / HOLLOW_SAMPLES)
         # the first contact ends one sample before the hollow; Newton's method finds the exact ends of both
-        node[k + 1, S_ARC] = arc * (HOLLOW_SAMPLES - last - 1) / HOLLOW_SAMPLES
         node[k, S_ARC] = arc * (first - 1) / HOLLOW_SAMPLES
         geodesic(k, node, ends[0], ends[1], ends[2])
         geodesic(k + 1, node, ends[0], ends[1], ends[2])

@@ -63,9 +63,8 @@ def wrap_on_side(k, ends, node, side, done, ax, ay, az, bx, by, bz, fx, fy, high
     done: the straight segment from A to B passes on that side already; then only a hint right above or below the
     middle of the tube is followed. (fx, fy): the lowest point of AB.
 
-    Newton's method starts from the hint first, then from circles round the tube in
-    planes through the ring's axis: the first is next to AB, the others turn away from it to both sides, and the last
-    is next to the hint.
+    Newton's method starts from the hint first, then from circles round the tube in planes through the ring's axis: the
+    first is next to AB, the others turn away from it to both sides, and the last is next to the hint.
     """
     level = hint_is_level(k, node)
     if done and not level:
