@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar
 
 import numba
@@ -45,7 +46,7 @@ event.register("numba:compile", _Announcer())
 def jit(function: F, kind: str = "Kernel", *further: Any, **options: bool) -> F:
     """Compile a kernel: without the GIL, IEEE arithmetic with fused multiply-adds, machine code kept on disk.
 
-    A kernel whose name begins with an underscore cannot be called from Python, which makes it cheaper to compile.
+    kind: the class in `linking.py`. Only `from_python` makes what Python calls quickly and without further compilation.
     """
     if config.DISABLE_JIT:
         return function
@@ -55,12 +56,16 @@ def jit(function: F, kind: str = "Kernel", *further: Any, **options: bool) -> F:
         return plain
     from mjwrap.kernels.compilation import linking  # uses inner parts of numba that another version may lack
 
-    if function.__name__.startswith("_"):
-        kind, options = "Hidden", options | {"no_cpython_wrapper": True}
     kernel: Any = getattr(linking, kind)(function, linking.OPTIONS | options, *further)
-    with module_caches.kept(function):
+    kernel.kept = partial(module_caches.kept, function)
+    with kernel.kept():
         kernel.enable_caching()
     return kernel
+
+
+def from_python(function: F) -> F:
+    """Compile a kernel that the package calls from Python."""
+    return jit(function, "FromPython")
 
 
 def no_inline(function: F) -> F:
@@ -78,8 +83,8 @@ def deferred(*returns: Any) -> Callable[[F], F]:
 
 
 def allocating(function: F) -> F:
-    """Compile a kernel that allocates arrays."""
-    return jit(function, _nrt=True)
+    """Compile a kernel that allocates arrays, which the package calls from Python."""
+    return jit(function, "FromPython", _nrt=True)
 
 
 def inlined(function: F) -> F:

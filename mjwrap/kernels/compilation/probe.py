@@ -30,9 +30,9 @@ def _combine(x):
 
 # `linking.py` looks them up by these names.
 multiply = linking.NotInlined(_multiply, linking.OPTIONS)
-shift = linking.Hidden(_shift, linking.OPTIONS | {"no_cpython_wrapper": True})
+shift = linking.Kernel(_shift, linking.OPTIONS)
 halve = linking.Deferred(_halve, linking.OPTIONS, types.float64)
-combine = linking.Kernel(_combine, linking.OPTIONS)
+combine = linking.FromPython(_combine, linking.OPTIONS)
 _multiply.__qualname__ = "multiply"
 _halve.__qualname__ = "halve"
 

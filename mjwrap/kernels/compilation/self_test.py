@@ -63,7 +63,7 @@ def _probed() -> str:
     """Return a hash of the sources of the test: a changed test runs again."""
     import hashlib
 
-    files = [Path(__file__).with_name(name) for name in ("linking.py", "probe.py")]
+    files = [Path(__file__).with_name(name) for name in ("linking.py", "pipeline.py", "probe.py")]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:8]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import inlined, jit
+from mjwrap.kernels.compilation.jit import from_python, inlined, jit
 from mjwrap.kernels.coupling.muscle_paths import R_HI, R_LO, R_MUSCLE
 from mjwrap.kernels.solved.polyline import polyline
 from mjwrap.kernels.solved.segments import G_A, G_B, G_FAR
@@ -59,7 +59,7 @@ def _begin(muscle, last, count, starts):
     return muscle
 
 
-@jit
+@from_python
 def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
     """Write the points of all paths to out, and each muscle's first row to starts (n + 1,); return how many points.
 
@@ -79,7 +79,7 @@ def polylines(routes, node, seg, seg_count, info, spacing, only, out, starts):
     return count
 
 
-@jit
+@from_python
 def contacts(routes, node, seg, seg_count, only, out, starts):
     """Write P and Q of every touched obstacle to out, two rows each, and starts (n + 1,); return how many rows."""
     count = 0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python
 
 
-@jit
+@from_python
 def first_bad(values):
     """Return the index of the first entry of (n,) that is not finite, or -1."""
     for i in range(values.shape[0]):
@@ -16,7 +16,7 @@ def first_bad(values):
     return -1
 
 
-@jit
+@from_python
 def all_finite(qpos, qvel, act, ctrl, mocap_pos, mocap_quat, excitation):
     """Return whether every entry of a simulation's state and inputs is finite."""
     for values in (qpos, qvel, act, ctrl, excitation):

@@ -5,13 +5,13 @@ In a call from Python a named group costs about 2 us, an array 0.1 us.
 
 from __future__ import annotations
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python
 from mjwrap.kernels.coupling import evaluation, moments
 from mjwrap.kernels.coupling.groups import Dofs, Paths, Poses, Routes
 from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart, Timing
 
 
-@jit
+@from_python
 def evaluate(
     rows, weights, links,
     law, params, source, index, control, ctrl_low, ctrl_high, form, times, off,
@@ -39,7 +39,7 @@ def evaluate(
     )
 
 
-@jit
+@from_python
 def length_jacobian(
     rows, weights, links,
     node, segments, count, info,

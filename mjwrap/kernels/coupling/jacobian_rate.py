@@ -8,7 +8,7 @@ Arrays named as in mjData and mjModel have their shapes and frames.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.coupling.muscle_paths import (
     L_BODY,
     R_FROM,
@@ -97,7 +97,7 @@ def _add_row(weight, k, place, body, gradient, rate, twist, kinematics, row, jac
         dof = dof_parentid[dof]
 
 
-@jit
+@from_python
 def length_jacobian_rate(
     routes, weights, links, site_xpos, node, kinematics, twist, gradient, rate, owner, stop, jacobian
 ):

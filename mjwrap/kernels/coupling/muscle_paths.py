@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, VANISHING, list_segments
 from mjwrap.kernels.spans.chain import solve_chain
 from mjwrap.kernels.spans.end_inside import has_valid_length, list_pulling_segments
@@ -64,7 +64,7 @@ def _roll_back(lo, hi, cold, node):
                 node[k, lay.S_MODE + i] = node[k, lay.W_OLD + i]
 
 
-@jit
+@from_python
 def end_body(rows, links, c, index):
     """Return the body of a segment's end: that of a node, or of the origin or insertion of route c."""
     if index < rows[c, R_LO]:

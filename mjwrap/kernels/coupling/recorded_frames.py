@@ -8,7 +8,7 @@ last the row behind the frame.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import inlined, jit
+from mjwrap.kernels.compilation.jit import from_python, inlined, jit
 from mjwrap.kernels.coupling.drawn_paths import route_contacts, route_points
 from mjwrap.kernels.coupling.groups import Dofs, Paths, Routes
 from mjwrap.kernels.coupling.moments import length_jacobian
@@ -63,7 +63,7 @@ def _route_forces(c, routes, seg, seg_count, size, out, count):
     )  # fmt: skip
 
 
-@jit
+@from_python
 def put_state(row, numbers, status, info, all_numbers, all_status, all_iterations):
     """Write the numbers (Q, n), status (n,) and iterations (C,) of an evaluation as a row."""
     for m in range(status.shape[0]):
@@ -74,7 +74,7 @@ def put_state(row, numbers, status, info, all_numbers, all_status, all_iteration
         all_iterations[row, c] = info[c, lay.I_ITERATIONS]
 
 
-@jit
+@from_python
 def put_frame(
     routes, weights, links, node, seg, seg_count, info, tension, spacing, last_dof, dof_parentid, body_rootid, cdof,
     subtree_com, xpos, xquat, muscles, columns, jacobian, t, points, strips, contacts, touches, forces, pulls, arms,
@@ -135,7 +135,7 @@ def count_rows(starts, counts, where):
             total += counts[k, t]
 
 
-@jit
+@from_python
 def gather(rows, starts, where, out, counts):
     """Copy points from a store's rows (m, 3) to out, sorted by part, then by frame; counts (K, T) is written."""
     count_rows(starts, counts, where)
@@ -149,7 +149,7 @@ def gather(rows, starts, where, out, counts):
             where[k] = to
 
 
-@jit
+@from_python
 def gather_arrows(rows, starts, where, scale, tails, vectors, counts):
     """Write forces of a store as arrows, in the order of `gather`: tails and vectors (m, 3) [m]; scale [m/N]."""
     count_rows(starts, counts, where)
@@ -164,7 +164,7 @@ def gather_arrows(rows, starts, where, scale, tails, vectors, counts):
             where[k] = to
 
 
-@jit
+@from_python
 def list_strips(starts, routes, sizes, counts):
     """Write the sizes of all strips with points to sizes (C T,), sorted by muscle, frame and route; return how many.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, R_SURFACES, moment, segment_bodies
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
@@ -59,7 +59,7 @@ def body_wrenches(routes, poses, paths, tension, wrench):
 # ------------------------------------------------------------------ xfrc_applied, shared with others
 
 
-@jit
+@from_python
 def remove_from_xfrc(xfrc, others, mine, total, written):
     """Remove mjwrap's last contribution from xfrc_applied (nbody, 6), so that only the forces of others remain.
 
@@ -96,7 +96,7 @@ def remove_from_xfrc(xfrc, others, mine, total, written):
         written[b] = False
 
 
-@jit
+@from_python
 def add_to_xfrc(xfrc, others, mine, total, written, wrench):
     """Remove the last contribution from xfrc_applied and add wrench (nbody, 6); arrays as of `remove_from_xfrc`."""
     remove_from_xfrc(xfrc, others, mine, total, written)

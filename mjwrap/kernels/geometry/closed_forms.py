@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, put_start
 
 DIM, S_P, S_T, S_ARC = lay.DIM, lay.S_P, lay.S_T, lay.S_ARC
@@ -65,7 +67,7 @@ def cone_angle(slope):
     return over, abs(slope) * over
 
 
-@jit
+@deferred(types.none)
 def cone(k, node):
     """Straight line on the unrolled cone (K = 0): a = 1, r = s.
 
@@ -119,7 +121,7 @@ def _curvature(node, k, column, around, along, across):
     )
 
 
-@jit
+@deferred(types.none)
 def capsule(k, node):
     """Helices on the cylinder and great circles on the caps in turn; the Jacobi fields are continuous at the seams."""
     radius, half = node[k, DIM], node[k, DIM + 1]

@@ -12,7 +12,7 @@ import math
 from numba.core import types
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import deferred, jit
+from mjwrap.kernels.compilation.jit import deferred, from_python, jit
 from mjwrap.kernels.geometry.capsule_seams import slide_over_seam, way_over_shaft
 from mjwrap.kernels.geometry.clearance import (
     bounded_part,
@@ -61,7 +61,7 @@ END_PROBE = 1e-3  # distance of the extra samples at the segment's ends, as a sh
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
-@jit
+@from_python
 def is_surface_kind(kind):
     """Return whether a number is a kind of surface that the functions below know."""
     return lay.VIA < kind < lay.KINDS and kind == math.floor(kind)
@@ -123,7 +123,7 @@ def project(node, k, x, y, z):
     return NAN, NAN, NAN, NAN, NAN, NAN
 
 
-@jit
+@from_python
 def height(node, k, x, y, z):
     """Return the signed height of a point of S over obstacle k's surface [m]."""
     kind = node[k, KIND]

@@ -23,7 +23,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import config, jit
+from mjwrap.kernels.compilation.jit import config, deferred, jit
 from mjwrap.kernels.geometry.vectors import put_curvature, put_end, put_fields, put_start
 
 GEODESIC, PROJECT, HEIGHT = lay.DIM + 1, lay.DIM + 2, lay.DIM + 3  # columns of the addresses
@@ -121,7 +121,7 @@ _call_height: Any = _height_plain if config.DISABLE_JIT else intrinsic(_height_c
 # ---------------------------------------------------------------------------------- what kernels call
 
 
-@jit
+@deferred(types.none)
 def custom_geodesic(k, node):
     """Evaluate obstacle k's geodesic from its saved start (P, t, s) into its row, as `dispatch.evaluate_geodesic`.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.musculotendon import degroote_fregly, millard, mujoco_muscle, path_actuator
 
 PATH_ACTUATOR = path_actuator.CODE
@@ -27,13 +27,13 @@ EXPONENTIAL_TENDON = (DEGROOTE_FREGLY,)
 NAN = math.nan
 
 
-@jit
+@from_python
 def is_law_code(law):
     """Return whether a number is the code of a law."""
     return law in WITH_FIBER or law in WITHOUT_FIBER
 
 
-@jit
+@from_python
 def has_fiber(law):
     """Return whether a law has a fibre and a tendon, rigid or elastic."""
     return law in WITH_FIBER

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.musculotendon.actearly import next_activation
 from mjwrap.kernels.musculotendon.activation_dynamics import advance, rate
 from mjwrap.kernels.musculotendon.dispatch import has_fiber
@@ -72,7 +72,7 @@ def read_states(muscles, inputs, timing, start):
             fiber[m] = act[index[m] + 1] if source[m] == STATE_IN_ACT else own[m, 1]
 
 
-@jit
+@from_python
 def write_states(source, index, activation, fiber, act, own):
     """Write the states that mjwrap integrates, (n,) each, to where `read_states` reads them."""
     for m in range(source.shape[0]):
@@ -153,7 +153,7 @@ def drive_muscles(muscles, timing, start, states):
             next_fiber[m] = start.fiber[m]
 
 
-@jit
+@from_python
 def simulate(
     law,
     params,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.musculotendon import fiber
 from mjwrap.kernels.musculotendon import tension as muscle
 from mjwrap.kernels.musculotendon.dispatch import (
@@ -97,7 +97,7 @@ def powers(law, params, m, activation, length, speed, fiber_length, constants, e
     out[METABOLIC, m] = total
 
 
-@jit
+@from_python
 def energetics(law, params, activation, excitation, length, speed, fiber_length, constants, out):
     """Fill out (OUTPUTS, n) for all muscles; arrays (n,), params (n, PARAMS), constants (n, CONSTANTS: `umberger.py`).
 

@@ -6,12 +6,12 @@ negative.
 
 from __future__ import annotations
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python
 from mjwrap.kernels.musculotendon.dispatch import fiberless_tension, has_fiber
 from mjwrap.kernels.musculotendon.fiber import rigid_tension
 
 
-@jit
+@from_python
 def tension(law, params, m, activation, length, speed):
     """Return the tension of muscle m [N] under its law, activation 0..1, length [m] and lengthening speed [m/s].
 

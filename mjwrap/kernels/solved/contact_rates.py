@@ -6,7 +6,7 @@ along b; `hessian.py` computes the shifts ("Stiffness and sliding contacts" in d
 
 from __future__ import annotations
 
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.solved.hessian import FLAT, NO_FAULT, sideways_shifts
 from mjwrap.kernels.solved.path_points import (
     CORNER,
@@ -34,7 +34,7 @@ from mjwrap.kernels.solved.path_points import (
 FLATTEST = 1e-12  # smallest normal curvature at a contact, divided by the reciprocal of the surface's size
 
 
-@jit
+@from_python
 def contact_rates(count, twist, size, points, out):
     """Write velocity of P (3), of Q (3) and rate of s of every touched node to out (nodes, 7); return (fault, slot).
 

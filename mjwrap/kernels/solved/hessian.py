@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.solved.inside_corners import list_corner, slide_corner, stiffen_corner, turn_corner
 from mjwrap.kernels.solved.path_points import (
     CORNER,
@@ -104,7 +104,7 @@ def _write_arriving_segment(k, node, x, y, z, px, py, pz, i, points):
     return good
 
 
-@jit
+@from_python
 def list_path_points(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, points):
     """Write the points of the solved chain lo..hi and eliminate its shifts; return (how many, fault, slot at fault).
 
@@ -272,7 +272,7 @@ def _add_force_and_moment(sign, i, arm, j, column, points, out):
     out[k, 5] += x * fy - y * fx
 
 
-@jit
+@from_python
 def add_gradient(count, points, out):
     """Add dl/dx (n + 2, 6) to out: the derivatives of the length in translation and rotation of every pose."""
     for i in range(1, count):
@@ -293,7 +293,7 @@ def _add_rotation_part(sign, i, arm, j, twist, points, out):
         out[k, 3 + c] += spin_e * points[i, arm + c] + spin_arm * points[j, D_E + c] - along * twist[k, 3 + c]
 
 
-@jit
+@from_python
 def add_stiffness_times(count, twist, points, out):
     """Add to out (n + 2, 6) the Hessian of the length times a motion of the poses.
 
@@ -317,7 +317,7 @@ def add_stiffness_times(count, twist, points, out):
                 out[k, 3 + c] += points[i, D_X] * points[i, D_NP + c] - points[i, D_Y] * points[i, D_NQ + c]
 
 
-@jit
+@from_python
 def stiffness(count, points, twist, out, matrix):
     """Write the Hessian (6 (n + 2), 6 (n + 2)); twist and out (n + 2, 6) are scratch."""
     slots = twist.shape[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.geometry.geodesics import geodesic
 
 W_P, W_Q, W_TP, S_ARC, S_MODE = lay.W_P, lay.W_Q, lay.W_TP, lay.S_ARC, lay.S_MODE
@@ -27,7 +27,7 @@ def _straight(x, y, z, px, py, pz, spacing, out, count):
     return count
 
 
-@jit
+@from_python
 def polyline(lo, hi, ox, oy, oz, ix, iy, iz, node, spacing, out, first):
     """Write points along the solved chain lo..hi to out[first:], at most `spacing` apart; return how many.
 

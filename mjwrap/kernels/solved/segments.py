@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 from mjwrap.kernels.wraps.ruled import INSIDE
 
@@ -66,7 +66,7 @@ def set_pull_at_end(j, k, at_p, node, base, seg):
         seg[j, other + i] = seg[j, end + i]
 
 
-@jit
+@from_python
 def list_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
     """Write the straight segments of the solved chain lo..hi to seg[first:]; return how many."""
     x, y, z = 0.0, 0.0, 0.0
@@ -131,7 +131,7 @@ def _point_rate(px, py, pz, ex, ey, ez, pos, twist, row):
     return ex * vx + ey * vy + ez * vz
 
 
-@jit
+@from_python
 def lengthening_rate(count, seg, pos, twist):
     """Return the lengthening speed (17) [m/s].
 
@@ -159,7 +159,7 @@ def _add_point_force(wrench, row, px, py, pz, fx, fy, fz):
     wrench[row, 5] += px * fy - py * fx
 
 
-@jit
+@from_python
 def add_wrenches(count, seg, tension, wrench):
     """Add to wrench (n + 2, 6) the forces and moments of a path under tension [N] on origin, obstacles and insertion.
 

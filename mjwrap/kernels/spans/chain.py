@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import allocating, jit
+from mjwrap.kernels.compilation.jit import allocating, from_python, jit
 from mjwrap.kernels.geometry.dispatch import is_surface_kind
 from mjwrap.kernels.geometry.geodesics import displace
 from mjwrap.kernels.spans.cold_start import path_length
@@ -28,7 +28,7 @@ I_LENGTH, I_STATUS, I_ERROR = lay.I_LENGTH, lay.I_STATUS, lay.I_ERROR
 I_ITERATIONS, I_EVALUATIONS = lay.I_ITERATIONS, lay.I_EVALUATIONS
 
 
-@jit
+@from_python
 def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     """Find the path from (ox, oy, oz) to (ix, iy, iz) over nodes lo..hi; results go to info[row].
 
@@ -88,7 +88,7 @@ def solve_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, tol, direct, info, row):
     info[row, I_EVALUATIONS] = evaluations
 
 
-@jit
+@from_python
 def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
     """Evaluate the path that the rows hold, without changing it; length and tangency error go to info[row].
 
@@ -116,7 +116,7 @@ def evaluate_chain(lo, hi, ox, oy, oz, ix, iy, iz, node, info, row):
     info[row, I_STATUS] = status
 
 
-@jit
+@from_python
 def set_rotation(node, k, w, x, y, z):
     """Write R_WS of the quaternion (w, x, y, z), normalised first, to row k."""
     scale = 2.0 / (w * w + x * x + y * y + z * z)

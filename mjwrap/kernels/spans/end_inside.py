@@ -29,7 +29,7 @@ import math
 from numba.core import types
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import deferred, inlined, jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, from_python, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import height, nearest
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.geometry.traits import closed_form
@@ -211,13 +211,13 @@ def substitute_path(lo, hi, ends, node, tol, direct):
     return best, error, iterations, evaluations
 
 
-@inlined
+@from_python
 def has_valid_length(status, error):
     """Return whether there is a path or a substitute path, from status and error in `info`."""
     return status == lay.CONVERGED or (status == lay.ENDPOINT_INSIDE and error < NO_SUBSTITUTE)
 
 
-@jit
+@from_python
 def list_pulling_segments(lo, hi, ox, oy, oz, ix, iy, iz, node, seg, first):
     """Write the segments of a substitute path as `list_segments` does; the one at an end inside has no length.
 

@@ -7,8 +7,10 @@ of a hollow that it bridges ("Hollows"); the second row has TOUCH > 0.
 
 from __future__ import annotations
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import segment_clearance, winding_angle
 from mjwrap.kernels.geometry.geodesics import geodesic, move_start_along
 from mjwrap.kernels.geometry.projection import turn_into_frame
@@ -107,7 +109,7 @@ def _move_to_second_row(k, node):
     remove_contact(k, node)
 
 
-@jit
+@deferred(types.int64)
 def split_at_hollow(lo, hi, ends, node):
     """Split the geodesics that run through a hollow, where a string would lift off; return how many.
 

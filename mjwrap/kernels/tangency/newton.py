@@ -57,16 +57,10 @@ def newton(lo, hi, ends, node, tol, max_iterations, square=NOT_EVALUATED):
         aimed = _row_at_end_on_surface(lo, hi, node)
         if aimed >= 0:
             aimed, square = _aim_at_end_on_surface(aimed, lo, hi, ends, node, square)
-    seamed = any_seams(lo, hi, node)
     iterations = 0
-    moved = True
-    while moved and not terminate(square, iterations, tol, max_iterations):
-        if seamed:
-            moved, square, i, e = step_with_seams(lo, hi, ends, node, square)
-        else:
-            moved, square, i, e = step(lo, hi, ends, node, square, False)
-        iterations += i
-        evaluations += e
+    if not terminate(square, iterations, tol, max_iterations):
+        square, iterations, further = iterate(lo, hi, ends, node, square, tol, max_iterations)
+        evaluations += further
     if aimed >= 0:
         node[aimed, lay.W_END_TARGET] = 0.0
     return math.sqrt(square), iterations, evaluations
@@ -88,6 +82,25 @@ def init(lo, hi, ends, node, square):
         square = evaluate(lo, hi, ends, node)
         evaluations += 1
     return square, evaluations
+
+
+@deferred(types.float64, types.int64, types.int64)
+def iterate(lo, hi, ends, node, square, tol, max_iterations):
+    """Take Newton steps until the iteration ends; return (||f||^2, iterations, evaluations).
+
+    square: ||f||^2 of the evaluation that the rows hold.
+    """
+    seamed = any_seams(lo, hi, node)
+    iterations, evaluations = 0, 0
+    moved = True
+    while moved and not terminate(square, iterations, tol, max_iterations):
+        if seamed:
+            moved, square, i, e = step_with_seams(lo, hi, ends, node, square)
+        else:
+            moved, square, i, e = step(lo, hi, ends, node, square, False)
+        iterations += i
+        evaluations += e
+    return square, iterations, evaluations
 
 
 @inlined

@@ -8,8 +8,10 @@ behind a seam is moved there before the step. "Seams" in docs/derivation.md.
 
 from __future__ import annotations
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import has_seams, slide_past_seam, way_to_seam
 from mjwrap.kernels.geometry.geodesics import move_start_along
 from mjwrap.kernels.tangency.path_error import path_error_jacobian_at_P, path_error_jacobian_at_Q
@@ -28,7 +30,7 @@ def any_seams(lo, hi, node):
     return False
 
 
-@no_inline
+@deferred(types.none)
 def step_over_seams(lo, hi, share, ends, node):
     """Change the slides in W_Y, the Newton step, of contacts that get over a seam in a share of it.
 
@@ -50,7 +52,7 @@ def step_over_seams(lo, hi, share, ends, node):
         node[k, W_Y + 3] = sigma - slide
 
 
-@no_inline
+@deferred(types.boolean)
 def move_to_seams(lo, hi, ends, node, least):
     """Move contacts that belong behind a seam there, along their geodesics; return whether any was moved.
 

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
 from mjwrap.kernels.geometry.elliptic_cylinder import ellipse_arc
 from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
@@ -184,7 +186,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     return inside
 
 
-@jit
+@deferred(types.int64)
 def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     """Wrap a string from A to B over an elliptic cylinder about z."""
     a, b = node[k, DIM], node[k, DIM + 1]
@@ -238,7 +240,7 @@ def _tangent_ruling(rho, radius):
     return math.atan2(root, radius), root
 
 
-@jit
+@deferred(types.int64)
 def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     """Wrap a string from A to B over a cone about z.
 

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 
+from numba.core import types
+
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import jit, no_inline
+from mjwrap.kernels.compilation.jit import deferred, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import into_frame, turn_into_frame
@@ -71,7 +73,7 @@ def _plane_normal(ax, ay, az, bx, by, bz, k, node):
     return wx / size, wy / size, wz / size
 
 
-@jit
+@deferred(types.int64)
 def _wrap_sphere(k, ax, ay, az, bx, by, bz, node):
     """Wrap a string from A to B over a sphere about the origin, the shorter way, in closed form."""
     radius = node[k, DIM]

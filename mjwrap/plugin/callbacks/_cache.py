@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 
 import numba
 
+from mjwrap.kernels.compilation import jit as kernels
+from mjwrap.kernels.compilation import self_test
 from mjwrap.kernels.compilation.module_caches import kept
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -15,12 +17,15 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "c
 
 def jit(function: F) -> F:
     """Compile a function that callbacks call."""
-    with kept(function):
-        compiled: Any = numba.njit(function, nogil=True, **_OPTIONS)
-        return compiled
+    return kernels.jit(function, _nrt=True)  # it may return an array made from an address
 
 
 def callback(signature: Any, function: Callable[..., Any]) -> Any:
     """Compile a function with a C signature now; MuJoCo calls it by its `address`."""
+    options = dict(_OPTIONS)
+    if not self_test.is_plain():
+        from mjwrap.kernels.compilation.pipeline import KernelCompiler
+
+        options["pipeline_class"] = KernelCompiler
     with kept(function):
-        return numba.cfunc(signature, **_OPTIONS)(function)
+        return numba.cfunc(signature, **options)(function)
