@@ -47,6 +47,7 @@ from mjwrap.runs.run_table import DEFAULT_KINDS, KINDS
 from mjwrap.runs.simulation import RunSettings
 
 COLUMNS = ",".join(DEFAULT_KINDS)
+FILM_ONLY = ("camera", "background", "colors", "surfaces", "legend", "shadows")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,6 +99,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="camera of the film: a camera of the model, or 'muscles', which looks at the muscles (default: a view of "
         "the whole model)",
     )
+    film("--background", metavar="COLOUR", default=None, help="behind the model: light (default), dark, '#RRGGBB', or "
+        "model, the model's own sky and scenery")  # fmt: skip
+    film("--colors", choices=("muscle", "activation", "model"), help="colours of the muscles: one for each muscle, by "
+        "activation, or the model's (default: one for each, if the model gives all the same)")  # fmt: skip
+    either = argparse.BooleanOptionalAction
+    film("--surfaces", action=either, default=None, help="show all wrapping surfaces, translucent, or none (default: "
+        "those that the model shows)")  # fmt: skip
+    film(
+        "--legend",
+        action=either,
+        default=None,
+        help="names beside their colours (default: for up to 12 muscles)",
+    )
+    film(
+        "--shadows", action="store_true", default=None, help="draw shadows, which takes several times as long"
+    )
     files = parser.add_argument_group("plot and tables").add_argument
     files(
         "--plot",
@@ -124,8 +141,9 @@ def settings(options: argparse.Namespace) -> RunCommandSettings:
         raise UserError("--video needs the engine plugin: leave --mode out, or write --mode wrench")
     if mode not in MODES:
         raise UserError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
-    if options.camera and not options.video:
-        raise UserError("--camera needs a film: add --video")
+    for name in FILM_ONLY:
+        if getattr(options, name) is not None and not options.video:
+            raise UserError(f"--{name} needs a film: add --video")
     if options.columns != COLUMNS and not (options.out or options.csv):
         raise UserError("--columns needs a table: add --out or --csv")
     places = (options.record, options.connect, options.serve)
@@ -160,7 +178,11 @@ def _film(options: argparse.Namespace) -> FilmSettings | None:
     if not options.video:
         return None
     width, height = options.video_size
-    return FilmSettings(options.video, width, height, options.fps, options.speed, options.camera)
+    return FilmSettings(
+        options.video, width, height, options.fps, options.speed, options.camera,
+        background=options.background or "light", colors=options.colors, surfaces=options.surfaces,
+        legend=options.legend, shadows=bool(options.shadows),
+    )  # fmt: skip
 
 
 def _positions(entries: Sequence[str]) -> dict[str, float]:
