@@ -14,6 +14,7 @@ from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
 
 if TYPE_CHECKING:
+    from mjwrap.recording.blueprint import First
     from mjwrap.recording.frames import Buffers
     from mjwrap.recording.stream import Stream
     from mjwrap.system.results import Results
@@ -85,6 +86,7 @@ class Recorder(RunLog):
                 target.discard()
             raise
         self._laid_out = False
+        self._first: First | None = None
         self._begin(str(connect if target is None else target.path), target, self._stream.abandon)
 
     def log(self, data: Any) -> None:
@@ -107,7 +109,9 @@ class Recorder(RunLog):
 
     def _lay_out(self) -> None:
         if not self._laid_out:
-            self._buffers.lay_out(self._stream)
+            self._first = self._buffers.begin(self._stream)
+            if self._live:  # a viewer needs the layout at once; that of a file knows the ranges of all curves
+                self._stream.blueprint(self._buffers.layout(self._first))
             self._laid_out = True
 
     def _flush(self) -> None:
@@ -117,6 +121,8 @@ class Recorder(RunLog):
     def _finish(self) -> None:
         self._lay_out()
         self._flush()
+        if not self._live and self._first is not None:
+            self._stream.blueprint(self._buffers.layout(self._first))
         self._stream.finish()
 
 

@@ -57,6 +57,7 @@ class Offscreen:
                 f"{_CHOICE}=egl (a graphics card's driver, or Mesa's libEGL) or {_CHOICE}=osmesa (libOSMesa) before "
                 f"mujoco is imported"
             )
+        self._dressed = False
         self._scene = mujoco.MjvScene(model, MAXGEOM)
         self._scene.flags[int(mujoco.mjtRndFlag.mjRND_SHADOW)] = shadows
 
@@ -92,6 +93,9 @@ class Offscreen:
         mujoco.mjv_updateScene(self._model, data, option, None, camera, every, self._scene)
         if dress is not None:
             dress(self._scene, self._renderer)
+            if not self._dressed:  # MuJoCo draws its first scene with the fog that the context was made with
+                self._dressed = True
+                mujoco.mjr_render(mujoco.MjrRect(0, 0, 1, 1), self._scene, self._renderer)
         mujoco.mjr_render(self._rect, self._scene, self._renderer)
         pixels = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._renderer)
