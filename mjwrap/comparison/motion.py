@@ -68,6 +68,10 @@ class MotionDifference:
         d = int(np.argmax(np.abs(self.difference[-1])))
         return self.dofs[d], float(self.difference[-1, d])
 
+    def unit(self, dof: str) -> str:
+        """Return the unit of a degree of freedom: rad or m."""
+        return "rad" if self.turns[self.dofs.index(dof)] else "m"
+
 
 def unstable(data: mujoco.MjData) -> bool:
     """Return whether MuJoCo has reset an unstable state, which it does without an exception."""

@@ -74,7 +74,7 @@ class Video(RunLog):
             )
         self._model, self._camera = model, find_camera(model, camera)
         self._option = option or mujoco.MjvOption()
-        self._look = FilmLook(background, colors, surfaces, legend, int(height))
+        self._look = FilmLook(background, colors, surfaces, legend, int(width), int(height))
         self._signature = model.signature
         self._rate = fps / speed  # frames per simulated second
         self._start: float | None = None  # time of the first frame

@@ -15,11 +15,11 @@ Picture = NDArray[np.uint8]
 Entry = tuple[str, Any, bool]  # text, colour (3,) from 0 to 1, whether it is a dot instead of a line
 SIZE = 0.034  # height of the letters, as part of a frame's height
 LEAST = 9  # [pixels]
-OPACITY = 0.72  # of the box behind the text
+OPACITY = 0.8  # of the box behind the text
 
 
 class Legend:
-    """A box of names beside their colours in the upper left corner of frames."""
+    """A box of names beside their colours in a corner of frames."""
 
     def __init__(self, entries: Sequence[Entry], height: int, *, dark: bool) -> None:
         try:
@@ -55,10 +55,32 @@ class Legend:
                 font=face,
                 anchor="lm",
             )
+        self._corner: int | None = None
         self._box = np.asarray(box, dtype=np.uint8)
 
+    @property
+    def area(self) -> int:
+        """Number of pixels that it covers."""
+        return int(self._box.shape[0] * self._box.shape[1])
+
     def put(self, picture: Picture) -> None:
-        """Draw the legend into a picture (height, width, 3), as much of it as fits."""
+        """Draw the legend into a picture (height, width, 3), as much of it as fits.
+
+        It stands in the corner that hides least of the first picture, and stays there.
+        """
         rows, columns = min(len(self._box), len(picture)), min(self._box.shape[1], picture.shape[1])
-        part, box = picture[:rows, :columns], self._box[:rows, :columns]
+        corners = [
+            (slice(y, y + rows), slice(x, x + columns))
+            for x in (0, picture.shape[1] - columns)
+            for y in (0, len(picture) - rows)
+        ]
+        if self._corner is None:
+            self._corner = min(range(4), key=lambda k: _contents(picture[corners[k]]))
+        part, box = picture[corners[self._corner]], self._box[:rows, :columns]
         part[:] = np.rint((1.0 - OPACITY) * part + OPACITY * box).astype(np.uint8)
+
+
+def _contents(part: Picture) -> int:
+    """Return the number of pixels that differ from the most frequent colour."""
+    colors = part[..., 0].astype(np.int64) << 16 | part[..., 1].astype(np.int64) << 8 | part[..., 2]
+    return int(colors.size - np.unique(colors, return_counts=True)[1].max())

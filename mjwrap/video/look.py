@@ -16,19 +16,27 @@ from mjwrap.video.formats import Picture
 from mjwrap.video.legend import Legend
 from mjwrap.video.muscle_looks import MuscleLooks, check_colors, hide, pale_floors
 
+MOST = 0.25  # of a frame, that a legend may cover which nobody asked for
+
 
 class FilmLook:
-    """The look of a film; see `Video` for the options. height: of a frame [pixels]."""
+    """The look of a film; see `Video` for the options. width, height: of a frame [pixels]."""
 
     def __init__(
-        self, background: str, colors: str | None, surfaces: bool | None, legend: bool | None, height: int
+        self,
+        background: str,
+        colors: str | None,
+        surfaces: bool | None,
+        legend: bool | None,
+        width: int,
+        height: int,
     ) -> None:
         check_colors(colors)
         for name, value in (("surfaces", surfaces), ("legend", legend)):
             require(name, value, value in (None, True, False), "True, False or None")
         self._color = background_color(background)
         self._dark = self._color is not None and float(np.mean(self._color)) < 0.5
-        self._options, self._height, self._wants_legend = (colors, surfaces), height, legend
+        self._options, self._size, self._wants_legend = (colors, surfaces), (width, height), legend
         self._data: mujoco.MjData | None = None
         self._looks: MuscleLooks | None = None
         self._legend: Legend | None = None
@@ -64,7 +72,10 @@ class FilmLook:
         if entries and (self._wants_legend or (self._wants_legend is None and looks.few)):
             # a legend that nobody asked for needs no error if Pillow is missing
             with contextlib.nullcontext() if self._wants_legend else contextlib.suppress(RecordingError):
-                self._legend = Legend(entries, self._height, dark=self._dark)
+                self._legend = Legend(entries, self._size[1], dark=self._dark)
+        most = MOST * self._size[0] * self._size[1]
+        if self._legend is not None and not self._wants_legend and self._legend.area > most:
+            self._legend = None
 
     def _dress(
         self, scene: mujoco.MjvScene, context: mujoco.MjrContext, data: mujoco.MjData, looks: MuscleLooks
