@@ -18,7 +18,7 @@ from mjwrap.video.background import NAMED
 from mjwrap.video.muscle_looks import PALETTE
 
 pytest.importorskip("PIL.Image", reason="legends need Pillow")
-SIZE = {"width": 160, "height": 120}
+SIZE: dict[str, Any] = {"width": 160, "height": 120}
 LIGHT = np.rint(255 * np.array(NAMED["light"])).astype(int)
 
 
@@ -117,7 +117,7 @@ def test_muscles_of_one_look_are_told_apart_and_named(elbow: mujoco.MjData, tmp_
     assert 0 < len(rows) < 0.12 * changed.size
     assert rows.min() == 0 or rows.max() == size[1] - 1  # in a corner
     assert columns.min() == 0 or columns.max() == size[0] - 1
-    small = {"size": (64, 48)}  # no space for one that nobody asked for
+    small: dict[str, Any] = {"size": (64, 48)}  # no space for one that nobody asked for
     np.testing.assert_array_equal(
         frame(elbow, tmp_path, **small), frame(elbow, tmp_path, **small, legend=False)
     )

@@ -1,7 +1,7 @@
 """The layout of the viewer: the model in 3D beside the muscles' curves, in groups if there are many muscles."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -222,9 +222,9 @@ def _scenery(scene: Scene, size: float) -> list[str]:
     ]
 
 
-def _looks(scene: Scene) -> dict[str, rr.AsComponents]:
+def _looks(scene: Scene) -> dict[Any, Any]:
     """Return the first look of the geoms, by entity: nothing hides a muscle."""
-    found = {}
+    found: dict[Any, Any] = {}
     for i, path in enumerate(scene.geoms):
         look = see_through(scene.model, i, wraps=i in scene.wrapping)
         if look is not None:
