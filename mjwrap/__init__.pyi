@@ -55,6 +55,8 @@ from .paths import solve_sweep as solve_sweep
 from .plugin import install as install
 from .plugin import load as load
 from .plugin import register as register
+from .poses import JointCurves as JointCurves
+from .poses import curves as curves
 from .recording import Recorder as Recorder
 from .surfaces import Capsule as Capsule
 from .surfaces import Cone as Cone

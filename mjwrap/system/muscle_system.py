@@ -18,6 +18,7 @@ from mjwrap.kernels.coupling import from_python, wrenches
 from mjwrap.kernels.musculotendon import dynamics
 from mjwrap.kernels.musculotendon.dispatch import PATH_ACTUATOR
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
+from mjwrap.muscles.fibers import FiberState, fiber_state
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
 from mjwrap.system.derivatives import length_jacobian_rate
@@ -145,6 +146,16 @@ class MuscleSystem(Evaluator):
             np.where(idle, PATH_ACTUATOR, plan.law), plan.params, np.where(idle, 0.0, state.activation),
             state.start.drive, state.length, np.where(idle, 0.0, state.velocity), state.fiber, constants,
         )  # fmt: skip
+
+    def fiber_state(self) -> FiberState:
+        """Return lengths, angles and forces of all fibres and tendons at the last evaluation.
+
+        After `step` and `apply` with an elastic tendon they belong to the state at the start of the step. Raises
+        `StateError` before the first evaluation.
+        """
+        plan, state, speed = self._plan, self._last, self.energetics().fiber_velocity
+        given = state.activation, state.length, state.velocity, state.fiber
+        return fiber_state(plan.law, plan.params, *given, speed)
 
     # -------------------------------------------------------------------------------------- stepping
 
