@@ -16,6 +16,7 @@ from mjwrap.cli.common.output import note_inputs, say, written
 
 COMMANDS = {
     "run": "simulate a model with its muscles along geodesic paths",
+    "plot": "plot lengths, moment arms and forces over a joint, with tables of data over them",
     "compare": "compare MuJoCo's built-in tendons with mjwrap's paths on the same model",
     "inspect": "list the muscles of a model, what drives them, and which parameters are implausible",
     "check": "test the paths, moment arms, forces and energy of a model",

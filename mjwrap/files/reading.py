@@ -34,11 +34,11 @@ def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
             k, column = (int(x[0]) for x in np.nonzero(~np.isfinite(table.values)))
             raise TableError(f"'{name}' row {k + 1}, column '{table.names[column]}': not finite")
         return table
-    text = _read_text(name)
+    text = read_text(name)
     return _read_opensim(name, text, finite) if suffix in (".sto", ".mot") else _read_csv(name, text, finite)
 
 
-def _read_text(name: str) -> str:
+def read_text(name: str) -> str:
     try:
         return Path(name).read_bytes().decode("utf-8-sig")
     except OSError as error:
@@ -64,7 +64,7 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None:
         raise TableError(f"'{name}' has no line 'endheader', which must end the header of OpenSim's files")
-    metadata = _header(lines[:end])
+    metadata = header_entries(lines[:end])
     kind = metadata.get("DataType", "double")
     if kind.lower() != "double":
         raise TableError(f"'{name}' has {kind} in its cells; only DataType=double can be read")
@@ -83,7 +83,7 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
     return table
 
 
-def _header(lines: list[str]) -> dict[str, str]:
+def header_entries(lines: list[str]) -> dict[str, str]:
     """Return the entries of a header: "key=value", SIMM's "key value", and the first line as the name."""
     found: dict[str, str] = {}
     for line in lines:

@@ -93,9 +93,9 @@ def curves(
 ) -> JointCurves:
     """Return lengths, moment arms, fibres and forces of muscles over the position of one joint.
 
-    Joints that are coupled to the joint follow it, so that moment arms are those of the coupled motion, −dl/dq with the
-    sign of OpenSim. Paths are followed from the reference pose, as in a motion. Muscles are at rest: fibres with elastic
-    tendons in static equilibrium at the activation.
+    Joints that are coupled to the joint follow it, so that moment arms are those of the coupled motion: −dl/dq, with
+    OpenSim's sign. Paths are followed from the reference pose, as in a motion. Muscles are at rest; fibres with elastic
+    tendons are in static equilibrium at the activation.
 
     Args:
         model: the model.

@@ -104,6 +104,37 @@ def number(text: str, where: str) -> float:
     return value
 
 
+def position(text: str, where: str) -> float:
+    """Return a position [rad or m], which may be written in degrees as "90deg"; else a `UserError` as of `number`."""
+    bare = text.strip().lower().removesuffix("deg")
+    value = number(bare, where)
+    return math.radians(value) if bare != text.strip().lower() else value
+
+
+def positions(entries: Sequence[str], option: str) -> dict[str, float]:
+    """Return positions [rad or m] by joint from "JOINT=VALUE"; VALUE as `position` takes it."""
+    found = {}
+    for entry in entries:
+        name, equals, text = entry.rpartition("=")
+        if not equals or not name:
+            raise UserError(
+                f"{option} '{entry}': write JOINT=VALUE, such as {entry or 'knee'}=0.5 [rad or m]"
+            )
+        found[name] = position(text, f"'{entry}'")
+    return found
+
+
+def span(text: str, option: str) -> tuple[float, float]:
+    """Return two increasing positions [rad or m] from "LOW,HIGH", each as `position` takes it."""
+    ends = text.split(",")
+    if len(ends) != 2:
+        raise UserError(f"{option} '{text}': write LOW,HIGH, such as 0,1.57 or 0deg,90deg")
+    low, high = (position(end, f"{option} '{text}'") for end in ends)
+    if not high > low:
+        raise UserError(f"{option} '{text}': the second number must be larger")
+    return low, high
+
+
 def add_analysis(add: Callable[..., object]) -> None:
     """Add the option --analysis; add: the add_argument of a parser or group."""
     add(
