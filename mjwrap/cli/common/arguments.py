@@ -140,8 +140,8 @@ def add_analysis(add: Callable[..., object]) -> None:
     add(
         "--analysis",
         metavar="PREFIX",
-        help="write lengths, fibre lengths, tensions and moment arms to files named as by OpenSim's MuscleAnalysis: "
-        "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto",
+        help="write lengths, moment arms, fibres, forces, powers and metabolic power to files named as by OpenSim: "
+        "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto, PREFIX_ProbeReporter_probes.sto",
     )
 
 
