@@ -13,6 +13,7 @@ from .calibration import implausible as implausible
 from .calibration import length_ranges as length_ranges
 from .calibration import set_length_ranges as set_length_ranges
 from .errors import GeometryError as GeometryError
+from .errors import MissingPackageError as MissingPackageError
 from .errors import MjwrapError as MjwrapError
 from .errors import ModelError as ModelError
 from .errors import PathError as PathError

@@ -118,6 +118,7 @@ def test_the_probe_has_the_columns_of_opensims(made: Path) -> None:
 
 KNEE = """
 <mujoco>
+  <compiler angle="radian"/>
   <worldbody><body name="thigh"><joint name="hip" axis="0 1 0"/><geom size=".02" mass="1"/>
     <site name="a" pos="0 0 .1"/>
     <body name="shank" pos="0 0 -.4"><joint name="knee" axis="0 1 0" range="-2 0"/><geom size=".02" mass="1"/>

@@ -116,15 +116,32 @@ def read_measured(
     return found
 
 
+def joint_of(entry: str, joints: Sequence[str]) -> str:
+    """Return which of the joints a table is over; raises `UserError` if no column is called by one of them."""
+    _, file = _split(entry)
+    table = read_columns(file)
+    for name in table.names:
+        bare = name.removeprefix("qpos:").removesuffix("/value").rpartition("/")[2]
+        if bare in joints:
+            return bare
+    raise UserError(
+        f"'{file}': no column is called by a joint; columns: {', '.join(table.names[:8])}; joints: {', '.join(joints)}"
+    )
+
+
+def _split(entry: str) -> tuple[str, str]:
+    """Return the quantity ("" if not given) and the file of "QUANTITY=FILE"."""
+    kind, mark, file = entry.partition("=")
+    return ("", entry) if not mark or Path(entry).is_file() else (kind, file)
+
+
 def _open(entry: str, quantities: Sequence[str]) -> tuple[Columns, str]:
     """Return a table, and the quantity of columns that do not say it ("" if unknown)."""
-    kind, mark, file = entry.partition("=")
-    if not mark or Path(entry).is_file():
-        kind, file = "", entry
-    elif kind not in QUANTITIES:
+    kind, file = _split(entry)
+    if kind and kind not in QUANTITIES:
         raise UserError(f"--data '{entry}': no quantity '{kind}'; quantities: {', '.join(QUANTITIES)}")
-    elif kind not in quantities:
-        raise UserError(f"--data '{entry}': {kind} is not drawn; add --quantity {kind}")
+    if kind and kind not in quantities:
+        raise UserError(f"--data '{entry}': {kind} is not drawn here, but {', '.join(quantities)}")
     if not kind:
         named = _FILE.search(Path(file).stem)
         known = named["quantity"] if named else ""
@@ -257,7 +274,7 @@ def odd_scales(curves: Iterable[MeasuredCurve], largest: Callable[[str, str], fl
             text = (
                 f"{curve.source}: {curve.quantity} of {curve.muscle} goes up to {here:.3g} {unit}, the model's to "
                 f"{there:.3g}; if the table is in another unit, write it in the head of the column, such as "
-                f"'{curve.muscle} [mm]', or add --data-unit"
+                f"'{curve.muscle} [mm]'"
             )
             found.setdefault((curve.source, curve.quantity), text)
     return list(found.values())

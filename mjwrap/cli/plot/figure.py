@@ -94,7 +94,7 @@ def _together(
     for axis in axes.ravel()[max(len(quantities) - across, 0) : len(quantities)]:
         axis.set_xlabel(_position(found))
         axis.tick_params(labelbottom=True)
-    _limit(axes[0, 0], found)
+    _limit(axes[0, 0], found, given)
     figure.suptitle(_title(found), fontsize=11)
     return figure
 
@@ -127,7 +127,7 @@ def _apart(
                 _draw(axis, each, name, quantity, colours[number % 10], "-")
             _draw_tables(axis, given, name, quantity, "0.15", found)
             axis.grid(alpha=0.25)
-            _limit(axis, found)
+            _limit(axis, found, given)
             if not single:
                 axis.set_title(name, fontsize=8.5, pad=3)
                 axis.tick_params(labelsize=7.5)
@@ -194,8 +194,9 @@ def _position(found: Sequence[ModelCurves]) -> str:
     return f"{', '.join(names)} [{'°' if found[0].curves.turns else 'm'}]"
 
 
-def _limit(axis: Any, found: Sequence[ModelCurves]) -> None:
-    ends = [_factor(each) * end for each in found for end in each.curves.at[[0, -1]].tolist()]
+def _limit(axis: Any, found: Sequence[ModelCurves], given: Sequence[MeasuredCurve]) -> None:
+    places = [*(each.curves.at for each in found), *(curve.at for curve in given if len(curve.at))]
+    ends = [_factor(found[0]) * end for at in places for end in at[[0, -1]].tolist()]
     margin = 0.015 * (max(ends) - min(ends))  # for points at the ends
     axis.set_xlim(min(ends) - margin, max(ends) + margin)
 
