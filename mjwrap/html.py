@@ -13,7 +13,9 @@ Point = Sequence[float]
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> str:
     """Return a table; the caption stands above it."""
-    title = f"<caption style='text-align:left'>{escaped(caption)}</caption>" if caption else ""
+    title = (
+        f"<caption style='text-align:left;white-space:nowrap'>{escaped(caption)}</caption>" if caption else ""
+    )
     heads = "".join(f"<th>{escaped(cell)}</th>" for cell in head)
     body = "".join(f"<tr>{''.join(f'<td>{escaped(cell)}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table>{title}<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
@@ -21,7 +23,9 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str = 
 
 def facts(entries: Iterable[tuple[str, object]], caption: str = "") -> str:
     """Return a table of names and values, without a head."""
-    title = f"<caption style='text-align:left'>{escaped(caption)}</caption>" if caption else ""
+    title = (
+        f"<caption style='text-align:left;white-space:nowrap'>{escaped(caption)}</caption>" if caption else ""
+    )
     body = "".join(f"<tr><th>{escaped(name)}</th><td>{escaped(value)}</td></tr>" for name, value in entries)
     return f"<table>{title}<tbody>{body}</tbody></table>"
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import MissingPackageError
 
 Array = NDArray[np.float64]
+NARROWEST = 0.45  # shortest range of an axis, as a share of the longest one
 
 
 def draw_paths(
@@ -40,25 +41,37 @@ def draw_paths(
             f"a plot needs matplotlib, which cannot be loaded ({error}): pip install 'mjwrap[demo]'"
         ) from None
     if axes is None:
-        axes = plt.figure(figsize=(6.5, 5.5), layout="constrained").add_subplot(projection="3d")
+        axes = plt.figure(figsize=(7.5, 5.5)).add_subplot(projection="3d")
+        axes.figure.subplots_adjust(
+            left=0.02, right=0.82, bottom=0.06, top=0.98
+        )  # room for the labels and a legend
     for grid in surfaces:
         axes.plot_wireframe(*np.moveaxis(grid, -1, 0), color="0.55", linewidth=0.5, alpha=0.7)
-    labelled = False
-    for number, (label, points) in enumerate(paths):
-        labelled |= bool(label)
+    for label, points in paths:
         shown = (
             f" {label}" if label.startswith("_") else label
         )  # a legend leaves out labels that begin with "_"
-        axes.plot(
-            *points.T, color=f"C{number % 10}" if len(paths) > 1 else "C3", linewidth=2.0, label=shown or None
-        )
+        colour = {} if label else {"color": "C3"}  # one after the other
+        axes.plot(*points.T, linewidth=2.0, label=shown or None, **colour)
     if len(marks):
         axes.plot(*marks.T, linestyle="none", marker="o", markersize=4.0, color="0.15")
     for name in "xyz":
-        getattr(axes, f"set_{name}label")(f"{name} [m]")
-    if labelled:
-        axes.legend(
-            fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), ncols=1 + (len(paths) - 1) // 25
-        )
+        getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=9.0)
+    axes.locator_params(nbins=5)
+    axes.tick_params(labelsize=8)
+    named = axes.get_legend_handles_labels()[1]
+    if named:
+        columns = 1 + (len(named) - 1) // 25
+        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), ncols=columns, frameon=False)
+    _widen(axes)
     axes.set_aspect("equal")
     return axes
+
+
+def _widen(axes: Any) -> None:
+    """Give every axis at least a share of the longest one's range, so that its ticks do not overlap."""
+    limits = [getattr(axes, f"get_{name}lim3d")() for name in "xyz"]
+    least = NARROWEST * max(high - low for low, high in limits)
+    for name, (low, high) in zip("xyz", limits, strict=True):
+        missing = max(least - (high - low), 0.0) / 2.0
+        getattr(axes, f"set_{name}lim3d")(low - missing, high + missing)

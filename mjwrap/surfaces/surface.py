@@ -83,7 +83,8 @@ class Surface:
             return html.facts([("surface", repr(self))])
         wide = self.stretch[1] * radii
         sides = [list(zip((sign * wide).tolist(), height.tolist(), strict=True)) for sign in (1.0, -1.0)]
-        ends = [[sides[0][k], sides[1][k]] for k in (0, -1)]
+        closed = bool(np.allclose((radii[0], height[0]), (radii[-1], height[-1])))  # a torus
+        ends = [] if closed else [[sides[0][k], sides[1][k]] for k in (0, -1)]
         return html.facts([("surface", repr(self))]) + html.drawing([], (), [*sides, *ends])
 
     def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
