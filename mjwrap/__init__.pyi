@@ -34,6 +34,8 @@ from .fitting import fit_elliptic_cylinder as fit_elliptic_cylinder
 from .fitting import fit_sphere as fit_sphere
 from .fitting import fit_torus as fit_torus
 from .fitting import mesh_points as mesh_points
+from .mjcf import insert_xml as insert_xml
+from .mjcf import muscle_xml as muscle_xml
 from .mjcf import set_laws as set_laws
 from .muscles import ActivationDynamics as ActivationDynamics
 from .muscles import DeGrooteFregly2016 as DeGrooteFregly2016

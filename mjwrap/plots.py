@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import MissingPackageError
 
 Array = NDArray[np.float64]
+ROWS = 26  # of a legend
 NARROWEST = 0.45  # shortest range of an axis, as a share of the longest one
 
 
@@ -41,17 +42,19 @@ def draw_paths(
             f"a plot needs matplotlib, which cannot be loaded ({error}): pip install 'mjwrap[demo]'"
         ) from None
     if axes is None:
-        axes = plt.figure(figsize=(7.5, 5.5)).add_subplot(projection="3d")
-        axes.figure.subplots_adjust(
-            left=0.02, right=0.82, bottom=0.06, top=0.98
-        )  # room for the labels and a legend
+        beside = 1.5 + 1.1 * (len(paths) // ROWS)  # for the labels and a legend [in]
+        figure = plt.figure(figsize=(6.0 + beside, 5.5))
+        axes = figure.add_subplot(projection="3d")
+        figure.subplots_adjust(left=0.02, right=6.0 / (6.0 + beside), bottom=0.04, top=0.98)
     for grid in surfaces:
         axes.plot_wireframe(*np.moveaxis(grid, -1, 0), color="0.55", linewidth=0.5, alpha=0.7)
-    for label, points in paths:
-        shown = (
-            f" {label}" if label.startswith("_") else label
-        )  # a legend leaves out labels that begin with "_"
-        colour = {} if label else {"color": "C3"}  # one after the other
+    many = plt.get_cmap("turbo")(np.linspace(0.03, 0.97, len(paths))) if len(paths) > 10 else None
+    for k, (label, points) in enumerate(paths):
+        # a legend leaves out labels that begin with "_"
+        shown = f" {label}" if label.startswith("_") else label
+        colour = {} if label else {"color": "C3"}  # else one after the other
+        if many is not None:
+            colour = {"color": many[k]}
         axes.plot(*points.T, linewidth=2.0, label=shown or None, **colour)
     if len(marks):
         axes.plot(*marks.T, linestyle="none", marker="o", markersize=4.0, color="0.15")
@@ -61,17 +64,19 @@ def draw_paths(
     axes.tick_params(labelsize=8)
     named = axes.get_legend_handles_labels()[1]
     if named:
-        columns = 1 + (len(named) - 1) // 25
+        columns = 1 + (len(named) - 1) // ROWS
         axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), ncols=columns, frameon=False)
-    _widen(axes)
-    axes.set_aspect("equal")
+    _equalise(axes)
     return axes
 
 
-def _widen(axes: Any) -> None:
-    """Give every axis at least a share of the longest one's range, so that its ticks do not overlap."""
+def _equalise(axes: Any) -> None:
+    """Give x, y and z the same scale, and each at least a share of the longest range, so that ticks do not overlap."""
     limits = [getattr(axes, f"get_{name}lim3d")() for name in "xyz"]
     least = NARROWEST * max(high - low for low, high in limits)
+    ranges = []
     for name, (low, high) in zip("xyz", limits, strict=True):
         missing = max(least - (high - low), 0.0) / 2.0
         getattr(axes, f"set_{name}lim3d")(low - missing, high + missing)
+        ranges.append(high - low + 2.0 * missing)
+    axes.set_box_aspect(ranges, zoom=0.82)
