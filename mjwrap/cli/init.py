@@ -156,11 +156,7 @@ def try_out(text: str, folder: Path, muscle: str) -> str:
             file.write(text)
         model = load(name)
     except ModelError as error:
-        said = str(error).replace(name, "the model with the muscle")
-        hint = (
-            "; a keyframe with act or ctrl needs a number for the new actuator" if "keyframe" in said else ""
-        )
-        raise UserError(f"{said}{hint}") from None
+        raise UserError(str(error).replace(name, "the model with the muscle")) from None
     finally:
         os.unlink(name)
     data = mujoco.MjData(model)

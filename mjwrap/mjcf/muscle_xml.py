@@ -6,6 +6,7 @@ Text is written, not an MjSpec, because MjSpec.to_xml rounds numbers to six digi
 from __future__ import annotations
 
 import difflib
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
@@ -13,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.names import listed, name_of, names
+from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.parameters import (
     DYNAMICS,
     FIBER_LAWS,
@@ -25,29 +26,13 @@ from mjwrap.mjcf.parameters import (
     TIMES,
     choose_law,
 )
+from mjwrap.mjcf.route_text import FINITE, Stop, read_route
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles.activation import FORMS
 from mjwrap.muscles.laws import TENDONS, MuJoCoMuscle
 
 OBJ = mujoco.mjtObj
-SHAPES = {key.removesuffix("_size"): sizes for key, sizes in SIZES.items()}
-FINITE = "finite"
 NATIVE = ("lengthrange", "force", "range", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax", "timeconst")
-ROUTE_FORMS = (
-    "SITE, GEOM, GEOM:HINT, GEOM@finite, GEOM@SHAPE=SIZE/SIZE or GEOM@SHAPE=SIZE/SIZE:HINT, separated by commas; "
-    f"shapes: {', '.join(SHAPES)}"
-)
-
-
-@dataclass(frozen=True)
-class _Stop:
-    """A stop of a route: the name of a site or geom, and of a geom its hint, shape and sizes [m]."""
-
-    kind: str  # "site" or "geom"
-    name: str
-    hint: str = ""
-    shape: str = ""
-    sizes: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,7 +40,7 @@ class _Muscle:
     """What is written: see `muscle_xml`."""
 
     name: str
-    stops: Sequence[_Stop]
+    stops: Sequence[Stop]
     law: str
     numbers: Mapping[str, Sequence[float]]
     words: Mapping[str, str] = field(default_factory=dict)
@@ -79,9 +64,9 @@ def muscle_xml(
         model: the compiled model, in which the names are looked up.
         name: name of the muscle.
         route: stops in order, separated by commas. The first and the last are sites; other sites are via points. A geom
-            may have a hint, GEOM:SITE, near which the path touches it; GEOM@SHAPE=SIZE/SIZE gives it another shape, with
-            sizes [m] as in docs/declaring.md; GEOM@finite wraps a cylinder geom as long as it is drawn. Where a site
-            and a geom have the same name, write site/NAME or geom/NAME.
+            may have a hint, GEOM:SITE, near which the path touches it; GEOM@SHAPE=SIZE/SIZE gives it another shape,
+            with sizes [m] as in docs/declaring.md; GEOM@finite wraps a cylinder geom as long as it is drawn. Where a
+            site and a geom have the same name, write site/NAME or geom/NAME.
         law: "degroote_fregly_2016", "millard_2012", "mujoco" or "path_actuator"; None for the one whose parameters
             are given.
         parameters: of the law, by the names of docs/declaring.md, such as max_isometric_force, and "tendon_model" and
@@ -95,7 +80,7 @@ def muscle_xml(
     Raises:
         ModelError: a name does not exist or is taken, or the route, the law or a parameter is not possible.
     """
-    stops = _read_route(model, route)
+    stops = read_route(model, route)
     numbers, words = _read_parameters(name, parameters or {})
     chosen = law or (choose_law({key: list(value) for key, value in numbers.items()}) if numbers else "")
     if chosen == "mujoco" and law is None:
@@ -114,67 +99,6 @@ def insert_xml(xml: str, fragment: str) -> str:
     if place < 0:
         raise ModelError("the text has no </mujoco>, before which a muscle could be inserted")
     return f"{xml[:place].rstrip()}\n{fragment}{xml[place:]}"
-
-
-def _read_route(model: mujoco.MjModel, route: str) -> list[_Stop]:
-    words = [word.strip() for word in route.split(",")]
-    if len(words) < 2 or not all(words):
-        raise ModelError(f"route '{route}': write at least two stops: {ROUTE_FORMS}")
-    stops = [_read_stop(model, word) for word in words]
-    for stop, what in ((stops[0], "first"), (stops[-1], "last")):
-        if stop.kind != "site":
-            raise ModelError(f"route '{route}': the {what} stop must be a site, not geom '{stop.name}'")
-    return stops
-
-
-def _read_stop(model: mujoco.MjModel, word: str) -> _Stop:
-    sites = [n for n in names(model, OBJ.mjOBJ_SITE, model.nsite) if not n.startswith("#")]
-    geoms = [n for n in names(model, OBJ.mjOBJ_GEOM, model.ngeom) if not n.startswith("#")]
-    kind, mark, bare = word.partition("/")
-    if mark and kind in ("site", "geom") and word not in (*sites, *geoms):
-        word = bare
-    else:
-        kind = ""
-    if word in sites and word in geoms and not kind:
-        raise ModelError(f"'{word}' is a site and a geom: write site/{word} or geom/{word}")
-    if kind != "geom" and word in sites:
-        return _Stop("site", word)
-    name, hint, shape, sizes = word, "", "", ()
-    if name not in geoms:
-        name, _, hint = word.rpartition(":") if ":" in word else (word, "", "")
-        name, mark, rest = name.partition("@")
-        if mark:
-            shape, sizes = _read_shape(word, rest)
-    if name not in geoms or kind == "site":
-        wanted = {"site": sites, "geom": geoms}.get(kind, [*sites, *geoms])
-        near = difflib.get_close_matches(name, wanted)
-        meant = f"did you mean {' or '.join(near)}? " if near else ""
-        raise ModelError(
-            f"'{word}': the model has no {kind or 'site or geom'} '{name}'; {meant}sites: {listed(sites)}; "
-            f"geoms: {listed(geoms)}"
-        )
-    if hint and hint not in sites:
-        near = difflib.get_close_matches(hint, sites)
-        meant = f"did you mean {' or '.join(near)}? " if near else ""
-        raise ModelError(f"'{word}': the hint '{hint}' is not a site; {meant}sites: {listed(sites)}")
-    return _Stop("geom", name, hint, shape, sizes)
-
-
-def _read_shape(word: str, text: str) -> tuple[str, tuple[float, ...]]:
-    if text == FINITE:
-        return FINITE, ()
-    shape, _, given = text.partition("=")
-    if shape not in SHAPES:
-        raise ModelError(f"'{word}': no shape '{shape}'; shapes: {listed(SHAPES)}, or {FINITE}")
-    wanted = SHAPES[shape]
-    try:
-        sizes = tuple(float(size) for size in given.split("/"))
-    except ValueError:
-        sizes = ()
-    if not wanted.least <= len(sizes) <= wanted.most:
-        raise ModelError(f"'{word}': write {shape}={'/'.join(wanted.meaning.split())} [m]")
-    wanted.build(*sizes)  # a GeometryError says what is wrong with the sizes
-    return shape, sizes
 
 
 def _read_parameters(
@@ -243,8 +167,9 @@ def _check_law(
 
 def _check_names(model: mujoco.MjModel, name: str, actuator: str | None, driven: bool) -> None:
     mixed = [key for key in (*NUMERICS, *SIZES) if key in name]
-    if not name or mixed:
-        why = f"contains '{mixed[0]}', which is the name of a parameter" if mixed else "is empty"
+    if not name or mixed or name.split() != [name]:
+        why = "is empty" if not name else "contains a space, which tuples of MuJoCo cannot hold"
+        why = f"contains '{mixed[0]}', which is the name of a parameter" if mixed else why
         raise ModelError(f"muscle '{name}': its name {why}")
     kinds = (
         ("actuator", OBJ.mjOBJ_ACTUATOR, name),
@@ -260,6 +185,18 @@ def _check_names(model: mujoco.MjModel, name: str, actuator: str | None, driven:
     if actuator and mujoco.mj_name2id(model, OBJ.mjOBJ_ACTUATOR, actuator) < 0:
         known = (name_of(model, OBJ.mjOBJ_ACTUATOR, i) for i in range(model.nactuator))
         raise ModelError(f"muscle '{name}': no actuator '{actuator}'; actuators: {listed(known)}")
+    for i in range(model.ntuple if actuator else 0):
+        first, count = int(model.tuple_adr[i]), int(model.tuple_size[i])
+        has = any(
+            int(model.tuple_objtype[j]) == int(OBJ.mjOBJ_ACTUATOR)
+            and name_of(model, OBJ.mjOBJ_ACTUATOR, int(model.tuple_objid[j])) == actuator
+            for j in range(first, first + count)
+        )
+        if has and "mjwrap" in name_of(model, OBJ.mjOBJ_TUPLE, i):
+            raise ModelError(
+                f"muscle '{name}': actuator '{actuator}' drives a muscle already, that of tuple "
+                f"'{name_of(model, OBJ.mjOBJ_TUPLE, i)}'"
+            )
 
 
 def _text(muscle: _Muscle) -> str:
@@ -270,7 +207,7 @@ def _text(muscle: _Muscle) -> str:
         key in muscle.words or key in muscle.numbers for key in (DYNAMICS, TIMES, SMOOTHING)
     )
     if muscle.driven and not muscle.actuator:
-        sites = [_element("site", site=stop.name) for stop in muscle.stops if stop.kind == "site"]
+        sites = [_element("site", site=site) for site in _distinct_sites(muscle)]
         lines += [
             "<tendon>",
             f"  <!-- carries the actuator of {_comment(name)}; mjwrap's route is in the tuple -->",
@@ -312,6 +249,17 @@ def _text(muscle: _Muscle) -> str:
     return "".join(f"  {line}\n" for line in lines)
 
 
+def _distinct_sites(muscle: _Muscle) -> list[str]:
+    """Return the sites of a route for a tendon of MuJoCo, which must not have one twice in a row."""
+    sites = [name for name, _ in itertools.groupby(stop.name for stop in muscle.stops if stop.kind == "site")]
+    if len(sites) < 2:
+        raise ModelError(
+            f"muscle '{muscle.name}': its route has one site only, '{sites[0]}', over which no tendon for a new "
+            f"actuator can be put"
+        )
+    return sites
+
+
 def _actuator(muscle: _Muscle, own_states: bool) -> str:
     common = {
         "name": muscle.name,
@@ -319,13 +267,15 @@ def _actuator(muscle: _Muscle, own_states: bool) -> str:
         "ctrllimited": "true",
         "ctrlrange": "0 1",
     }
+    # all types are written, because a default of <muscle> holds for <general>, too
+    plain = {"gaintype": "fixed", "gainprm": "0", "biastype": "none"}
     if own_states:  # mjwrap integrates activation and fibre length
-        return _element("general", **common, dyntype="user", actdim="2", gaintype="fixed", gainprm="0")
+        return _element("general", **common, **plain, dyntype="user", actdim="2")
     if muscle.law == MuJoCoMuscle.law:
         given = {key: _digits(values) for key, values in muscle.numbers.items() if key in NATIVE}
         return _element("muscle", **common, **given)
     if muscle.law not in FIBER_LAWS:  # the activation is the control
-        return _element("general", **common, gaintype="fixed", gainprm="0")
+        return _element("general", **common, **plain, dyntype="none")
     return _element("muscle", **common, lengthrange="0.5 1")  # unused: the law's curves are mjwrap's
 
 

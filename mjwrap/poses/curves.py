@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import fnmatch
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import html
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.mjcf.names import listed, name_of
@@ -19,6 +21,7 @@ from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.tendon_curves import native_tendons, tendon_rows
 from mjwrap.system import MuscleSystem
+from mjwrap.text import counted
 
 Array = NDArray[np.float64]
 _SINGLE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -73,10 +76,29 @@ class JointCurves:
     native: Mapping[str, Array]
     follows: str = ""
 
+    def __repr__(self) -> str:
+        ends = (self.at[0], self.at[-1])
+        low, high = (f"{math.degrees(x):.4g}°" if self.turns else f"{x:.4g} m" for x in ends)
+        names = ", ".join(self.names[:6]) + ", ..." * (len(self.names) > 6)
+        count = counted(len(self.names), "muscle")
+        return f"JointCurves({self.joint} from {low} to {high}, {len(self.at)} positions, {count}: {names})"
+
+    def _repr_html_(self) -> str:
+        shown = [(name, QUANTITIES[name]) for name in ("length", "moment_arm", "tension")]
+        rows = [
+            [name, *(_range(self.values[q][:, i]) for q, _ in shown)] for i, name in enumerate(self.names)
+        ]
+        return html.table(["muscle", *(f"{q} [{unit}]" for q, unit in shown)], rows, repr(self))
+
     def __getitem__(self, quantity: str) -> Array:
         if quantity not in self.values:
             raise ModelError(f"no quantity '{quantity}'; there are: {', '.join(self.values)}")
         return self.values[quantity]
+
+
+def _range(values: Array) -> str:
+    good = values[np.isfinite(values)]
+    return f"{good.min():.4g} to {good.max():.4g}" if good.size else "-"
 
 
 def curves(
