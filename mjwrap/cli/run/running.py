@@ -16,6 +16,7 @@ from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
+from mjwrap.cli.run.mistakes import warn
 from mjwrap.cli.run.run_files import OutputSettings, open_outputs
 from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
@@ -52,6 +53,7 @@ def run(settings: RunCommandSettings) -> int:
                     wanted = replace(wanted, recording=replace(wanted.recording, connect=server.connect))
                 outputs = open_outputs(wanted, settings.model, simulation.engine, held)
             simulation.begin()
+            warn(settings.model, simulation)
             with Interrupt() as interrupt:
                 spent = advance(simulation, outputs, interrupt)
                 closing = time.perf_counter()
