@@ -65,8 +65,9 @@ class Posed:
 @contextmanager
 def evaluated(muscles: MuscleSystem, qpos: Array) -> Iterator[Posed]:
     """Give the muscles at a pose (nq,) inside a with block, and restore their last results after it."""
-    last = muscles._evaluation()
+    last, strict = muscles._evaluation(), muscles.strict
+    muscles.strict = False
     try:
         yield Posed(muscles, qpos)
     finally:
-        muscles._last = last
+        muscles._last, muscles.strict = last, strict

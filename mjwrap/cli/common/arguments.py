@@ -104,6 +104,19 @@ def number(text: str, where: str) -> float:
     return value
 
 
+def joint_position(text: str, where: str) -> float:
+    """Return a finite position [rad or m], in rad also of "90deg"; else a `UserError` that begins with `where`."""
+    from mjwrap.runs.angles import position  # with MuJoCo, which --help does not need
+
+    try:
+        value = position(text)
+    except ValueError:
+        raise UserError(f"{where}: {text!r} is not a number, or degrees such as 90deg") from None
+    if not math.isfinite(value):
+        raise UserError(f"{where}: {text} is not finite")
+    return value
+
+
 def add_analysis(add: Callable[..., object]) -> None:
     """Add the option --analysis; add: the add_argument of a parser or group."""
     add(

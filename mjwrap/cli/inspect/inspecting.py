@@ -18,7 +18,8 @@ from mjwrap.cli.common.errors import FAULTS, UserError
 from mjwrap.cli.common.output import Report
 from mjwrap.cli.inspect.declared import as_values, table
 from mjwrap.cli.inspect.moment_arms import arms_table, moment_arms
-from mjwrap.runs.models import load, start_keyframe, start_state
+from mjwrap.runs.angles import check_range
+from mjwrap.runs.models import load, single_joints, start_keyframe, start_state
 from mjwrap.text import counted
 
 
@@ -50,6 +51,9 @@ def inspect(settings: InspectSettings) -> int:
     JointSpace(
         copy.copy(model), rest, joints
     )  # read first, so that a mistake in a range is reported before the work
+    for name, (low, high) in joints.items():
+        if name in (single := single_joints(model)):
+            check_range(model, single[name], low, high)
     report = Report(settings.json)
     muscles = MuscleSystem(model, side_rule=settings.side_rule)
     if not muscles.names and not muscles.native:
