@@ -22,6 +22,7 @@ class Mistake(enum.StrEnum):
     RING = "ring not threaded"
     COLLIDES = "wrapping geom collides"
     SIDE = "side not met"
+    SIDE_AS_STOP = "side site as a stop"
     NO_JOINT = "no joint crossed"
     NO_MOMENT_ARM = "no moment arm"
     SIGN_CHANGE = "moment arm changes sign"

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.model.kinematic_tree import crossed_dofs
-from mjwrap.poses.sizes import muscle_size, turning_dofs
+from mjwrap.poses.sizes import LEAST, turning_dofs
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ class Posed:
         muscles.forward(self.data)
         self.poses = muscles.poses(self.data)
         self.found = muscles.status == 0
-        self.sizes = np.array([muscle_size(self.model, self.poses, m) for m in muscles.declarations])
+        self.sizes = np.array([_size(self.model, self.poses, m) for m in muscles.declarations])
         self.crossed = crossed_dofs(self.model, muscles.declarations)
         self.couplings = CoupledJoints(self.model)
         self.turning = turning_dofs(self.model)
@@ -60,6 +61,16 @@ class Posed:
         self.muscles.forward(self.data)
         self.data.qvel[:] = 0.0
         return np.where(self.muscles.status == 0, self.muscles.velocity, np.nan)
+
+
+def _size(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> float:
+    """Return the distances of a muscle's stops added up [m]: unlike `muscle_size`, whatever its surfaces' sizes are."""
+    total = 0.0
+    for route in muscle.routes:
+        stops = [route.origin, *(node.site for node in route.nodes if node.site >= 0), route.insertion]
+        steps = np.diff(poses.site_xpos[stops], axis=0)
+        total += route.weight * float(np.linalg.norm(steps, axis=1).sum())
+    return max(total, LEAST * float(model.stat.extent), 1e-300)
 
 
 @contextmanager

@@ -7,12 +7,14 @@ from collections.abc import Hashable, Iterator
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, muscle_of, quoted
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf import MuscleDeclaration, Route, name_of
 from mjwrap.mjcf.actuators import is_muscle
 
+Array = NDArray[np.float64]
 SAME = 1e-6  # distance of stops that count as one place, as a share of the muscle's size
 SHARP = np.cos(np.radians(150.0))  # a route that turns by more at a via site goes back where it came from
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -77,42 +79,67 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[Possi
         )
     for route in muscle.routes:
         yield from _of_stops(posed, i, muscle, route)
+        yield from _of_side_sites(posed, muscle, route)
 
 
 def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:
-    model, at = posed.model, posed.poses.site_xpos
-    stops: list[tuple[int, bool]] = [(route.origin, False)]  # sites, and whether a geom lies before them
-    geom = False
-    for node in route.nodes:
-        if node.site >= 0:
-            stops.append((node.site, geom))
-        geom = node.site < 0
-    stops.append((route.insertion, geom))
-    for (a, _), (b, _) in itertools.pairwise(stops):
-        if float(np.linalg.norm(at[b] - at[a])) <= SAME * posed.sizes[i]:
-            names = (
-                f"{quoted(model, 'site', a)} and {quoted(model, 'site', b)}"
-                if a != b
-                else f"{quoted(model, 'site', a)}, twice"
-            )
+    model, poses = posed.model, posed.poses
+    stops = [("site", route.origin)]
+    stops += [("site", node.site) if node.site >= 0 else ("geom", node.geom) for node in route.nodes]
+    stops.append(("site", route.insertion))
+    places = [(poses.site_xpos if kind == "site" else poses.geom_xpos)[index] for kind, index in stops]
+    names = [quoted(model, *stop) for stop in stops]
+    sites = [k for k, (kind, _) in enumerate(stops) if kind == "site"]
+    for a, b in itertools.pairwise(sites):
+        if float(np.linalg.norm(places[b] - places[a])) <= SAME * posed.sizes[i]:
             yield PossibleMistake(
                 Mistake.SAME_PLACE,
                 muscle_of(muscle),
-                f"has stops at one place, one after the other: {names}",
+                "has stops at one place, one after the other: "
+                + (f"{names[a]} and {names[b]}" if names[a] != names[b] else f"{names[a]}, twice"),
                 "leave one of them out, or give the site its own position",
             )
-    for (a, _), (b, before), (c, after) in zip(stops, stops[1:], stops[2:], strict=False):
-        if before or after:
-            continue
-        there, onwards = at[b] - at[a], at[c] - at[b]
-        length = float(np.linalg.norm(there) * np.linalg.norm(onwards))
-        if length > 0.0 and float(there @ onwards) < SHARP * length:
+    points = posed.muscles.points(i) if posed.found[i] else np.empty((0, 3))
+    for k in sites[1:-1]:
+        if _turns_back(points, places[k], SAME * posed.sizes[i]):
             yield PossibleMistake(
                 Mistake.TURNS_BACK,
                 muscle_of(muscle),
-                f"turns back at {quoted(model, 'site', b)}, between {quoted(model, 'site', a)} and "
-                f"{quoted(model, 'site', c)}",
+                f"turns back at {names[k]}, between {names[k - 1]} and {names[k + 1]}",
                 "check the order of its sites",
+            )
+
+
+def _turns_back(points: Array, site: Array, near: float) -> bool:
+    """Return whether a drawn path (m, 3) goes back, at a via site, nearly where it came from."""
+    away = np.linalg.norm(points - site, axis=1)
+    if not len(away) or not np.nanmin(away) <= near:
+        return False
+    k = int(np.nanargmin(away))
+    before = next((p for p in points[k::-1] if np.linalg.norm(p - site) > near), None)
+    after = next((p for p in points[k:] if np.linalg.norm(p - site) > near), None)
+    if before is None or after is None:
+        return False
+    there, onwards = site - before, after - site
+    return float(there @ onwards) < SHARP * float(np.linalg.norm(there) * np.linalg.norm(onwards))
+
+
+def _of_side_sites(posed: Posed, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:
+    """Yield a finding for a via site directly after a geom whose name says that it is a hint."""
+    for before, node in itertools.pairwise(route.nodes):
+        name = name_of(posed.model, mujoco.mjtObj.mjOBJ_SITE, node.site).lower() if node.site >= 0 else ""
+        if (
+            before.geom >= 0
+            and before.hint_site < 0
+            and ("side" in name or "hint" in name)
+            and "inside" not in name
+        ):
+            yield PossibleMistake(
+                Mistake.SIDE_AS_STOP,
+                quoted(posed.model, "site", node.site),
+                f"is a stop of {muscle_of(muscle)}, which runs through it, although its name speaks of a side of "
+                f"{quoted(posed.model, 'geom', before.geom)}",
+                'write prm="1" at its element in the tuple, which makes it a hint',
             )
 
 

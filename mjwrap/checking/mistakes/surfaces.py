@@ -16,7 +16,7 @@ from mjwrap.mjcf.wrapping_geoms import SIZES, size_keys
 
 Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj
-TINY, HUGE = 3e-3, 3.0  # sizes of a surface, as shares of the size of the muscle that wraps it
+TINY, HUGE = 5e-3, 10.0  # sizes of a surface, as shares of the size of the muscle that wraps it
 FAR = 3.0  # distance of a surface from the nearest stop, less its own size, as a share of the muscle's size
 RING = "torus_size"
 SHAPES = ("torus", "cone", "elliptic_cylinder")  # words in names of geoms that no geom type has
@@ -83,7 +83,7 @@ def _of_surface(
     away = min(float(np.linalg.norm(posed.poses.site_xpos[end] - centre)) for end in ends) - max(
         (x for x in surface.dims if np.isfinite(x)), default=0.0
     )
-    if away > FAR * size and not touched and np.isfinite(surface.z_limit):
+    if away > FAR * size and not touched and np.isfinite(surface.dims).all():
         return PossibleMistake(
             Mistake.FAR_AWAY,
             geom,
