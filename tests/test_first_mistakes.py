@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from cli_runs import CASE2, ROOT, only_files, run_here, said
 from first_model import Edit, compiled, edited, listed
+from random_models import ALL, random_model
 
 import mjwrap as mw
 from mjwrap.checking import Mistake, possible_mistakes
@@ -107,6 +109,11 @@ CASES: dict[str, Case] = {
         [('pos=".029 0 -.2"', 'pos="3 0 -.2"')],
         INSPECT, 0, ["geom 'sling'", "away from muscle 'BIC'", "check its position"],
     ),
+    "cylinder along the path": Case(
+        [('pos="0 0 -.3" zaxis="0 1 0"', 'pos="0 0 -.3"'), ('"via" pos=".032 0 -.12"', '"via" pos=".023 0 -.12"'),
+         *NO_RING, (' objname="elbow_side" prm="1"', ' objname="via"')],
+        INSPECT, 0, ["geom 'elbow_wrap' is a cylinder whose axis", "muscle 'TRI'", "turn the geom"],
+    ),
     "wrapping geom that collides": Case(
         [('zaxis="0 1 0"/>', 'zaxis="0 1 0" contype="1"/>'), ('0 0 -.25"', '0 0 -.25" conaffinity="1"')],
         INSPECT, 0, ["geom 'elbow_wrap'", "collides with geom 'ulna'", 'contype="0" conaffinity="0"'],
@@ -151,6 +158,10 @@ CASES: dict[str, Case] = {
     "range in degrees, read as radians": Case(
         [('angle="degree"', 'angle="radian"')],
         INSPECT, 0, ["joint 'elbow'", "0 to 130 rad", 'leave out <compiler angle="radian"/>'],
+    ),
+    "keyframe in degrees": Case(
+        [("<actuator/>", '<keyframe><key name="bent" qpos="90 0"/></keyframe>')],
+        INSPECT, 0, ["keyframe 'bent' puts joint 'elbow' at 90 rad", "in rad, whatever", "90 degrees are 1.571"],
     ),
     "degrees in `--prescribe`": Case(
         [], (*RUN, "--prescribe", "elbow=constant:90"), 2, ["joint 'elbow'", "14.3 turns", "write 90deg"]
@@ -214,10 +225,77 @@ def test_a_mistake_is_named_with_its_element_and_a_remedy(
         only_files(tmp_path, "arm.xml", "ik.mot")
 
 
+def page_rows() -> dict[str, str]:
+    """Return what the page says of each mistake."""
+    text = (ROOT / "docs" / "mistakes.md").read_text()
+    rows = re.findall(r"^\| (.+?) \| (.+) \|$", text, re.MULTILINE)
+    return {name: told for name, told in rows if name not in ("mistake", "---")}
+
+
+@pytest.mark.filterwarnings("default")
+def test_run_warns_where_the_page_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = page_rows()
+    names = [name for name in told if told[name].startswith("inspect, run")]
+    assert len(names) >= 20
+    for name in names:
+        case = CASES[name]
+        model = tmp_path / "arm.xml"
+        model.write_text(edited(*case.edits))
+        ran = run_here("run", capsys, model, "--duration", 0.01)
+        warned = [line for line in said(ran) if line.startswith("mjwrap run: warning: ")]
+        assert any(all(word in line for word in case.words) for line in warned), (name, warned)
+
+
+@pytest.mark.parametrize("mode", ["wrench", "transmission"])
+def test_run_warns_in_every_mode(mode: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "arm.xml"
+    model.write_text(edited(("mjwrap_BIC", "BIC")))
+    ran = run_here("run", capsys, model, "--duration", 0.01, "--mode", mode)
+    assert ran.code == 0, ran.err
+    assert any("warning: tuple 'BIC' looks like" in line for line in said(ran))
+
+
+def test_many_warnings_of_a_run_are_cut_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "arm.xml"
+    made = "".join(f'<numeric name="m{k}_torus_size" data="1 .1"/>' for k in range(9))
+    model.write_text(edited(("</custom>", f"{made}</custom>")))
+    lines = said(run_here("run", capsys, model, "--duration", 0.01))
+    assert len(lines) == 6
+    assert lines[-1] == f"mjwrap run: warning: 4 more; mjwrap inspect {model} lists them"
+
+
+def test_inspect_has_moment_arms_and_mistakes_as_values(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "arm.xml"
+    model.write_text(edited(("mjwrap_TRI", "TRI")))
+    values = json.loads(run_here("inspect", capsys, model, "--quick", "--json").out)
+    muscles = mw.MuscleSystem(compiled())
+    arms = muscles.moment_arms(mujoco.MjData(muscles.model), "elbow")
+    assert values["moment_arms"] == {"BIC": {"elbow": pytest.approx(float(arms[0, 0]))}}
+    (mistake,) = values["possible_mistakes"]
+    assert mistake["kind"] == "tuple that nothing reads"
+    assert mistake["element"] == "tuple 'TRI'"
+    text = run_here("inspect", capsys, model, "--quick").out
+    assert f"  BIC  elbow {1e3 * float(arms[0, 0]):+.3g}\n" in text
+    assert "1 possible mistake:\n  tuple 'TRI' looks like" in text
+
+
+def test_models_of_every_kind_are_searched_without_an_error() -> None:
+    """Balls, free joints, mocap bodies and every surface; whatever is found has an element that the model has."""
+    for seed in range(12):
+        muscles = mw.MuscleSystem(random_model(seed, ALL))
+        for mistake in possible_mistakes(muscles):
+            assert mistake.text
+            assert mistake.remedy
+            kind, _, name = mistake.element.partition(" ")
+            assert kind in ("muscle", "geom", "joint", "site"), mistake
+            assert kind != "muscle" or name.strip("'") in muscles.names
+
+
 def test_the_page_lists_every_mistake_and_their_number() -> None:
     text = (ROOT / "docs" / "mistakes.md").read_text()
-    listed_there = re.findall(r"^\| (.+?) \|", text, re.MULTILINE)
-    assert [row for row in listed_there if row not in ("mistake", "---")] == list(CASES)
+    assert list(page_rows()) == list(CASES)
     assert f"{len(CASES)} mistakes" in text
     assert len(CASES) >= 32
 

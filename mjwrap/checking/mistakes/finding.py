@@ -19,6 +19,7 @@ class Mistake(enum.StrEnum):
     PLACEHOLDER = "placeholder wrapped"
     SIZE = "size"
     FAR_AWAY = "far away"
+    AXIS = "axis along the path"
     RING = "ring not threaded"
     COLLIDES = "wrapping geom collides"
     SIDE = "side not met"
@@ -32,6 +33,7 @@ class Mistake(enum.StrEnum):
     SAME_PLACE = "stops at one place"
     TURNS_BACK = "route turns back"
     JOINT_RANGE = "joint range"
+    KEYFRAME = "keyframe in degrees"
     UNITS = "units"
 
 
@@ -59,6 +61,7 @@ class PossibleMistake:
 _OBJECTS = {
     "site": mujoco.mjtObj.mjOBJ_SITE,
     "geom": mujoco.mjtObj.mjOBJ_GEOM,
+    "keyframe": mujoco.mjtObj.mjOBJ_KEY,
     "joint": mujoco.mjtObj.mjOBJ_JOINT,
     "body": mujoco.mjtObj.mjOBJ_BODY,
     "tuple": mujoco.mjtObj.mjOBJ_TUPLE,

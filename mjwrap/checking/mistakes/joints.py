@@ -42,6 +42,7 @@ def joint_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
                 f"has a range of {low_deg:.3g} to {high_deg:.3g} degrees, in which it hardly moves",
                 'if these are radians, write <compiler angle="radian"/>',
             )
+    yield from _keyframes(model)
     sizes, gravity = posed.sizes, float(np.linalg.norm(model.opt.gravity))
     if len(sizes) and sizes.min() > LONG and gravity > 0.1:
         yield PossibleMistake(
@@ -50,3 +51,23 @@ def joint_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
             f"has muscles that are {sizes.min():.3g} to {sizes.max():.3g} m long, and a gravity of {gravity:.3g} m/s²",
             "lengths in MJCF are in metres: if these are millimetres, scale the model, or its gravity and forces",
         )
+
+
+def _keyframes(model: mujoco.MjModel) -> Iterator[PossibleMistake]:
+    """Yield a finding for every keyframe that puts a hinge half a turn or more outside its range."""
+    for key in range(model.nkey):
+        for joint in range(model.njnt):
+            if int(model.jnt_type[joint]) != _HINGE or not model.jnt_limited[joint]:
+                continue
+            low, high = (float(x) for x in model.jnt_range[joint])
+            value = float(model.key_qpos[key, model.jnt_qposadr[joint]])
+            if max(low - value, value - high) > np.pi:
+                yield PossibleMistake(
+                    Mistake.KEYFRAME,
+                    quoted(model, "keyframe", key),
+                    f"puts {quoted(model, 'joint', joint)} at {value:.4g} rad, {abs(value) / (2 * np.pi):.3g} turns, "
+                    f"and its range is {low:.4g} to {high:.4g} rad",
+                    f"qpos of a keyframe is in rad, whatever <compiler angle=...> says: {value:.4g} degrees are "
+                    f"{np.radians(value):.4g}",
+                )
+                break

@@ -18,7 +18,10 @@ Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj
 TINY, HUGE = 5e-3, 10.0  # sizes of a surface, as shares of the size of the muscle that wraps it
 FAR = 3.0  # distance of a surface from the nearest stop, less its own size, as a share of the muscle's size
-RING = "torus_size"
+ALONG = np.cos(
+    np.radians(5.0)
+)  # of the angle between an axis and the line between the stops before and after
+RING, ENDLESS = "torus_size", ("cylinder_size", "elliptic_cylinder_size")
 SHAPES = ("torus", "cone", "elliptic_cylinder")  # words in names of geoms that no geom type has
 
 
@@ -89,6 +92,16 @@ def _of_surface(
             geom,
             f"is {millimetres(away)} away from {muscle_of(muscle)}, which is {millimetres(size)} long",
             "check its position, and that it is in the right body",
+        )
+    chord = posed.poses.site_xpos[ends[1]] - posed.poses.site_xpos[ends[0]]
+    axis = posed.poses.geom_xmat[node.geom].reshape(3, 3)[:, 2]
+    along = abs(float(chord @ axis)) > ALONG * float(np.linalg.norm(chord)) > 0.0
+    if along and surface.numeric in ENDLESS and not touched:
+        return PossibleMistake(
+            Mistake.AXIS,
+            geom,
+            f"is a {shape} whose axis, local z, runs along {muscle_of(muscle)}, which does not touch it",
+            "turn the geom so that its axis runs across the path, such as zaxis='0 1 0'",
         )
     if surface.numeric == RING and posed.found[i] and not touched and not _threads(posed, i, node):
         return PossibleMistake(
