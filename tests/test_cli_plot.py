@@ -27,6 +27,9 @@ def table(path: Path, heads: list[str], *columns: np.ndarray, header: str = "") 
     """Write columns of numbers as a .csv file or, with a header, as OpenSim's."""
     between = "\t" if header else ","
     rows = [between.join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
+    if path.suffix == ".csv":
+        between = ","
+    rows = [between.join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
     path.write_text("\n".join([*([header] if header else []), between.join(heads), *rows]) + "\n")
     return path
 
@@ -50,6 +53,7 @@ STO = "motion\nversion=1\nnRows=10\nnColumns={n}\ninDegrees={degrees}\nendheader
         ("a.csv", ["angle", "flexor"], (ANGLES, ARM_OF), ""),
         ("a.csv", ["flexor", "/jointset/r/elbow/value [deg]"], (ARM_OF, ANGLES), ""),
         ("a.csv", ["qpos:elbow", "moment_arm:flexor:elbow"], (np.radians(ANGLES), ARM_OF), ""),
+        ("a.csv", ["elbow", "flexor"], (np.radians(ANGLES), ARM_OF), "# inDegrees=no"),
         ("a.sto", ["elbow", "flexor"], (ANGLES, ARM_OF), STO.format(n=2, degrees="yes")),
         ("a.sto", ["elbow", "flexor"], (np.radians(ANGLES), ARM_OF), STO.format(n=2, degrees="no")),
         (
@@ -183,8 +187,15 @@ def test_many_muscles_have_a_panel_each(
         (["--joint", "elbow", "knee", "--csv", "{out}"], "2 joints for 1 models"),
         (["--joint", "elbow", "--muscle", "BRA", "--csv", "{out}"], "no muscle 'BRA'; muscles: flexor"),
         (["--joint", "elbow", "--quantity", "stiffness", "--csv", "{out}"], "invalid choice: 'stiffness'"),
-        (["--joint", "elbow", "--qpos", "elbow=90", "--csv", "{out}"], "more than a full turn.*elbow=90deg"),
+        (
+            ["--joint", "elbow", "--qpos", "elbow=90", "--csv", "{out}"],
+            "90 rad are 14.3 turns.*if degrees are meant, write 90deg",
+        ),
         (["--joint", "elbow", "--range", "90deg,0deg", "--csv", "{out}"], "second number must be larger"),
+        (
+            ["--joint", "elbow", "--range", "0,90", "--csv", "{out}"],
+            "0 to 90 rad are 14.3 turns.*elbow=0deg,90deg",
+        ),
         (["--joint", "elbow", "--range", "0", "--csv", "{out}"], "write LOW,HIGH, such as"),
         (["--joint", "elbow", "--activation", "2", "--csv", "{out}"], "between 0 and 1"),
         (["--joint", "elbow", "--csv", "{out}", "--states", "x.mot"], "--states needs a table: add --data"),

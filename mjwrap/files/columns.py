@@ -59,7 +59,8 @@ class Columns:
 def read_columns(path: str | os.PathLike[str]) -> Columns:
     """Read columns of numbers from .csv, .sto, .mot or .npz; no column of time is needed.
 
-    Empty cells, "nan" and cells missing at the end of a line of a .csv file are NaN. Raises `TableError`, which names
+    Lines of a .csv file that begin with # are remarks; KEY=VALUE in them, such as inDegrees=no, is metadata. Empty
+    cells, "nan" and cells missing at the end of a line of a .csv file are NaN. Raises `TableError`, which names
     file, line and column of the first error.
     """
     name = os.fspath(path)
@@ -89,7 +90,9 @@ def read_columns(path: str | os.PathLike[str]) -> Columns:
             whole = [(i, [c.strip() for c in row]) for i, row in numbered if any(c.strip() for c in row)]
         except csv.Error:
             raise TableError(f"'{name}' is not a text file with comma-separated values") from None
-        whole = [(i, row) for i, row in whole if not row[0].startswith("#")]  # remarks
+        remarks = [",".join(row).lstrip("#") for _, row in whole if row[0].startswith("#")]
+        metadata = header_entries(remarks)
+        whole = [(i, row) for i, row in whole if not row[0].startswith("#")]
     if len(whole) < 2:
         raise TableError(f"'{name}' must have a line of names and rows of numbers")
     header = whole[0][1]

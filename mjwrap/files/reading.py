@@ -21,7 +21,8 @@ Row = tuple[int, list[str]]  # line number, cells
 def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
     """Read a table over time: OpenSim's .sto or .mot, .npz, else comma-separated values.
 
-    finite: refuse numbers that are not finite. A CSV file has a header with `time` [s] and names; an NPZ file has
+    finite: refuse numbers that are not finite. A CSV file has a header with `time` [s] and names, before which lines
+    such as `# inDegrees=yes` may stand; an NPZ file has
     `time` (T,), and either `columns` and `values`, as from `write_table`, or an array (T,) for each column, or (T, k)
     for columns called name[0] to name[k − 1]. Numbers are returned as in the file: `Table.in_degrees` tells whether
     rotations are in degrees. Raises `TableError`, which names file, line and column of the first error.
@@ -53,9 +54,12 @@ def _read_csv(name: str, text: str, finite: bool) -> Table:
         rows = [row for row in numbered if any(cell.strip() for cell in row[1])]
     except csv.Error:
         raise TableError(f"'{name}' is not a text file with comma-separated values") from None
+    first = next((i for i, (_, cells) in enumerate(rows) if not cells[0].lstrip().startswith("#")), len(rows))
+    metadata = header_entries([",".join(cells).strip().lstrip("#") for _, cells in rows[:first]])
+    rows = rows[first:]
     if not rows:
         raise TableError(f"'{name}' is empty; wanted: a header with 'time' and names, then rows of numbers")
-    return _table(name, [cell.strip() for cell in rows[0][1]], rows[1:], {}, finite)
+    return _table(name, [cell.strip() for cell in rows[0][1]], rows[1:], metadata, finite)
 
 
 def _read_opensim(name: str, text: str, finite: bool) -> Table:

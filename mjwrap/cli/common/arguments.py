@@ -104,15 +104,21 @@ def number(text: str, where: str) -> float:
     return value
 
 
-def position(text: str, where: str) -> float:
-    """Return a position [rad or m], which may be written in degrees as "90deg"; else a `UserError` as of `number`."""
-    bare = text.strip().lower().removesuffix("deg")
-    value = number(bare, where)
-    return math.radians(value) if bare != text.strip().lower() else value
+def joint_position(text: str, where: str) -> float:
+    """Return a finite position [rad or m], in rad also of "90deg"; else a `UserError` that begins with `where`."""
+    from mjwrap.runs.angles import position  # with MuJoCo, which --help does not need
+
+    try:
+        value = position(text)
+    except ValueError:
+        raise UserError(f"{where}: {text!r} is not a number, or degrees such as 90deg") from None
+    if not math.isfinite(value):
+        raise UserError(f"{where}: {text} is not finite")
+    return value
 
 
 def positions(entries: Sequence[str], option: str) -> dict[str, float]:
-    """Return positions [rad or m] by joint from "JOINT=VALUE"; VALUE as `position` takes it."""
+    """Return positions [rad or m] by joint from "JOINT=VALUE"; VALUE as for `joint_position`."""
     found = {}
     for entry in entries:
         name, equals, text = entry.rpartition("=")
@@ -120,16 +126,16 @@ def positions(entries: Sequence[str], option: str) -> dict[str, float]:
             raise UserError(
                 f"{option} '{entry}': write JOINT=VALUE, such as {entry or 'knee'}=0.5 [rad or m]"
             )
-        found[name] = position(text, f"'{entry}'")
+        found[name] = joint_position(text, f"'{entry}'")
     return found
 
 
 def span(text: str, option: str) -> tuple[float, float]:
-    """Return two increasing positions [rad or m] from "LOW,HIGH", each as `position` takes it."""
+    """Return two increasing positions [rad or m] from "LOW,HIGH", each as for `joint_position`."""
     ends = text.split(",")
     if len(ends) != 2:
         raise UserError(f"{option} '{text}': write LOW,HIGH, such as 0,1.57 or 0deg,90deg")
-    low, high = (position(end, f"{option} '{text}'") for end in ends)
+    low, high = (joint_position(end, f"{option} '{text}'") for end in ends)
     if not high > low:
         raise UserError(f"{option} '{text}': the second number must be larger")
     return low, high

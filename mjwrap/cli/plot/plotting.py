@@ -17,6 +17,7 @@ from mjwrap.cli.common.output import open_output, say
 from mjwrap.cli.plot.model_curves import ModelCurves, shown_unit, write_curves
 from mjwrap.errors import ModelError
 from mjwrap.poses import JointCurves, curves
+from mjwrap.runs.angles import check_range
 from mjwrap.runs.models import find_joint, load, start_keyframe, start_state
 from mjwrap.text import aligned, counted
 
@@ -94,14 +95,10 @@ def labels(models: Sequence[str]) -> list[str]:
 
 def _curves(settings: PlotSettings, source: str, joint: str) -> JointCurves:
     model = load(source)
-    for name, value in settings.positions.items():
-        turns = int(model.jnt_type[find_joint(model, name, name)]) == 3  # a hinge
-        if turns and abs(value) > 2.0 * math.pi:
-            raise UserError(
-                f"--qpos '{name}={value:g}' is more than a full turn [rad]; for degrees write {name}={value:g}deg"
-            )
     pose = start_state(model, start_keyframe(model, settings.keyframe), settings.positions).qpos
     try:
+        if settings.span is not None:
+            check_range(model, find_joint(model, joint, joint), *settings.span)
         return curves(
             model,
             joint,
