@@ -25,10 +25,7 @@ def arm(tmp_path: Path) -> Path:
 
 def table(path: Path, heads: list[str], *columns: np.ndarray, header: str = "") -> Path:
     """Write columns of numbers as a .csv file or, with a header, as OpenSim's."""
-    between = "\t" if header else ","
-    rows = [between.join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
-    if path.suffix == ".csv":
-        between = ","
+    between = "," if path.suffix == ".csv" else "\t"
     rows = [between.join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
     path.write_text("\n".join([*([header] if header else []), between.join(heads), *rows]) + "\n")
     return path

@@ -96,7 +96,7 @@ def read_measured(
         for name in table.names:
             if name in place:
                 continue
-            read = _column(name, muscles, joints, quantity)
+            read = _column(name, muscles, [*joints, *place], quantity)
             if read is None or read[1] not in quantities:
                 unused.append(name)
                 continue

@@ -149,7 +149,9 @@ def _misfits(found: Sequence[ModelCurves], given: Sequence[MeasuredCurve]) -> li
             if curve.muscle not in here.names or np.isnan(curve.value).all():
                 continue
             own = here[curve.quantity][:, here.names.index(curve.muscle)]
-            gap = np.interp(curve.at, here.at, own, left=np.nan, right=np.nan) - curve.value
+            slack = 1e-6 * float(np.ptp(here.at))  # positions are written with a few digits
+            within = (curve.at >= here.at[0] - slack) & (curve.at <= here.at[-1] + slack)
+            gap = np.where(within, np.interp(curve.at, here.at, own), np.nan) - curve.value
             gap = gap[np.isfinite(gap)]
             numbers = ["-"] * 3
             if gap.size:
