@@ -1,6 +1,7 @@
 """mjwrap plot: tables in any unit over the curves, labels with units, and mistakes that are named."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ def test_the_written_table_is_read_back(
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     """The figures that are drawn, in place of their files."""
     kept: list[Any] = []
     monkeypatch.setattr(figures, "save_figure", lambda figure, output: kept.append(figure))

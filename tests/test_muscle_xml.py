@@ -10,6 +10,7 @@ from cli_runs import ELBOW, only_files, run_here
 from test_curves import ARM
 
 import mjwrap as mw
+from mjwrap.surfaces.primitives import SURFACES
 
 TEXT = Path(ELBOW).read_text()
 MODEL = mujoco.MjModel.from_xml_path(ELBOW)
@@ -19,6 +20,9 @@ HILL = {
     "tendon_slack_length": 1e-3 / 7.0,
 }
 ROUTE = "BRA_origin,flexor_cylinder:flexor_side,BRA_insertion"
+
+
+HILL_LAW = mw.Millard2012(*HILL.values())
 
 
 def declared(name: str, route: str, **options: object) -> tuple[mujoco.MjModel, mw.MuscleSystem]:
@@ -73,7 +77,7 @@ def test_an_actuator_of_the_model_drives_the_muscle() -> None:
     model = mujoco.MjModel.from_xml_string(ARM)
     fragment = mw.muscle_xml(model, "x", "o,o,i", parameters=HILL, actuator="flexor", law="millard_2012")
     muscles = mw.MuscleSystem(mujoco.MjModel.from_xml_string(mw.insert_xml(ARM, fragment)))
-    assert muscles["flexor"].parameters == mw.Millard2012(**HILL)
+    assert muscles["flexor"].parameters == HILL_LAW
     assert (muscles["flexor"].route, muscles.n) == ("o > o > i", 1)
 
 
@@ -91,7 +95,7 @@ SHAPES = {
 
 def test_every_surface_can_be_declared() -> None:
     assert {word.partition("=")[0] for word in SHAPES} - {"finite"} == {
-        s.numeric.removesuffix("_size") for s in mw.surfaces.primitives.SURFACES if s.numeric
+        s.numeric.removesuffix("_size") for s in SURFACES if s.numeric
     }
     for word, surface in SHAPES.items():
         route = f"BRA_origin,flexor_cylinder@{word}:flexor_side,flexor_cylinder@{word},BRA_insertion"

@@ -115,7 +115,7 @@ class MuscleAnalysisTables:
 
     def _moving(self, model: mujoco.MjModel) -> list[int]:
         """Return the degrees of freedom that move a muscle, alone or with those that follow them."""
-        crossed = crossed_dofs(model, self._muscles.declarations).any(axis=0)
+        crossed = np.atleast_1d(crossed_dofs(model, self._muscles.declarations).any(axis=0))
         moving = crossed.copy()
         leaders = self._couplings.leader
         for joint in leaders:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import operator
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, SupportsIndex
 
 import mujoco
 import numpy as np
@@ -172,7 +172,7 @@ class Results:
             raise GeometryError(f"no muscle '{name}'; {meant}muscles: {listed(names)}")
         return names.index(name)
 
-    def __getitem__(self, muscle: str | int) -> MuscleView:
+    def __getitem__(self, muscle: str | SupportsIndex) -> MuscleView:
         """Return a view of one muscle, by name or number; `GeometryError`, with near names, if there is none."""
         if isinstance(muscle, str):
             return MuscleView(self, self.index(muscle))

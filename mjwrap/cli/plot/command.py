@@ -20,6 +20,7 @@ Examples:
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from mjwrap.cli.common.arguments import MODEL_HELP, add_side_rule, at_least, not_negative, positions, span
 from mjwrap.cli.common.errors import UserError
@@ -33,7 +34,7 @@ DEFAULT = ("length", "moment_arm")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    several = {"nargs": "+", "action": "extend"}
+    several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     add = parser.add_argument
     add("model", nargs="+", metavar="MODEL", help=MODEL_HELP)
     add("--joint", nargs="+", required=True, metavar="NAME", help="hinge or slide to move; one for all models, or "
