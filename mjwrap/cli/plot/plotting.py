@@ -53,7 +53,7 @@ def plot(settings: PlotSettings) -> int:
     picture = open_output(settings.picture, "--out", ".png", ".pdf", ".svg") if settings.picture else None
     table = open_output(settings.csv, "--csv", ".csv") if settings.csv else None
     if picture is not None:
-        need_matplotlib()
+        need_matplotlib("--out")
     found = [
         ModelCurves(label, _curves(settings, source, joint))
         for label, source, joint in zip(
