@@ -18,9 +18,9 @@ optimal_force [N] for path_actuator; lengthrange=LOW,HIGH [m] and force [N] for 
 parameters are given.
 
 Examples:
-  mjwrap init models/elbow/elbow.xml --muscle ANC --route BRA_origin,elbow_cylinder:elbow_side,TRIlat_insertion --set optimal_force=100
-  mjwrap init arm.xml --muscle BIC --route origin,elbow@torus=0.03/0.01,insertion --law millard_2012 --set max_isometric_force=600 optimal_fiber_length=0.1 tendon_slack_length=0.2 --out arm_with_biceps.xml
-"""  # noqa: E501
+  mjwrap init models/elbow/elbow.xml --muscle X --route BRA_origin,elbow_cylinder,BRA_insertion --set optimal_force=100
+  mjwrap init arm.xml --muscle BIC --route origin,elbow@torus=.03/.01,insertion --set optimal_force=100 -o new.xml
+"""
 
 from __future__ import annotations
 
