@@ -22,7 +22,9 @@ HILL = {
 ROUTE = "BRA_origin,flexor_cylinder:flexor_side,BRA_insertion"
 
 
-HILL_LAW = mw.Millard2012(*HILL.values())
+HILL_LAW = mw.Millard2012(
+    HILL["max_isometric_force"], HILL["optimal_fiber_length"], HILL["tendon_slack_length"]
+)
 
 
 def declared(name: str, route: str, **options: object) -> tuple[mujoco.MjModel, mw.MuscleSystem]:

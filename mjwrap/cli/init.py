@@ -14,8 +14,8 @@ may be
 
 --set gives the parameters of the law: max_isometric_force [N], optimal_fiber_length [m], tendon_slack_length [m],
 pennation_angle [rad] and others for degroote_fregly_2016 and millard_2012, tendon_model=elastic for an elastic tendon;
-optimal_force [N] for path_actuator; lengthrange=LOW,HIGH [m] and force [N] for mujoco. Without --law it is the law whose
-parameters are given.
+optimal_force [N] for path_actuator; lengthrange=LOW,HIGH [m] and force [N] for mujoco. Without --law it is the
+law whose parameters are given.
 
 Examples:
   mjwrap init models/elbow/elbow.xml --muscle X --route BRA_origin,elbow_cylinder,BRA_insertion --set optimal_force=100
