@@ -42,7 +42,7 @@ from mjwrap import Table, write_table
         ([ELBOW, "--connect", "--serve"], "not allowed with"),
         ([ELBOW, "--prescribe", "elbow_flexion=step:1@1"], "cannot jump"),
         ([ELBOW, "--prescribe", "knee=sine:1,1"], "knee.*elbow_flexion"),
-        ([ELBOW, "--prescribe", "elbow_flexion=sine:1,1", "--qpos", "elbow_flexion=1"], "is prescribed"),
+        ([ELBOW, "--prescribe", "elbow_flexion=sine:1,1,1", "--qpos", "elbow_flexion=1"], "is prescribed"),
         ([ELBOW, "--plot", "{folder}/missing/p.png"], "there is no folder.*missing"),
         ([ELBOW, "--plot", "{folder}/p.docx"], r"must end in \.png or \.pdf or \.svg"),
         ([ELBOW, "--csv", "{folder}/sub.csv"], "it is a folder"),

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import html
 from mjwrap.errors import TableError
 
 Array = NDArray[np.float64]
 SUFFIXES = (".sto", ".mot", ".csv", ".npz")
+SHOWN, FEW = 8, 4  # columns, and rows at either end, that a notebook shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,27 @@ class Table:
             )
         for name, value in (("time", time), ("names", names), ("values", values)):
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        rows = f"{len(self.time)} row{'s' * (len(self.time) != 1)}"
+        span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
+        names = ", ".join(self.names[:6]) + ", ..." * (len(self.names) > 6)
+        source = f", {self.source!r}" if self.source else ""
+        return f"Table({rows}{span}, {len(self.names)} column{'s' * (len(self.names) != 1)}: {names}{source})"
+
+    def _repr_html_(self) -> str:
+        """Return the table as a notebook shows it: its first and last rows and its first columns."""
+        names = self.names[:SHOWN]
+        some = len(self.time) > 2 * FEW
+        picked = (
+            [*range(FEW), *range(len(self.time) - FEW, len(self.time))] if some else range(len(self.time))
+        )
+        rows = [[f"{self.time[k]:g}", *(f"{x:.6g}" for x in self.values[k, : len(names)])] for k in picked]
+        if some:
+            rows.insert(FEW, ["..."] * (len(names) + 1))
+        return html.table(
+            ["time [s]", *names, *(["..."] if len(self.names) > SHOWN else [])], rows, repr(self)
+        )
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.names:

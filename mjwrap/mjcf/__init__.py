@@ -7,6 +7,7 @@ contains "mjwrap", for what MuJoCo's schema cannot express. Reading does not cha
 from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.loading import read_model, with_remedy
+from mjwrap.mjcf.muscle_text import insert_xml, muscle_xml
 from mjwrap.mjcf.names import act_names, dof_names, has_plugin, name_of, names, qpos_names
 from mjwrap.mjcf.reader import read_declarations
 from mjwrap.mjcf.routes import tendon_stops
@@ -21,7 +22,9 @@ __all__ = [
     "act_names",
     "dof_names",
     "has_plugin",
+    "insert_xml",
     "keeps_state",
+    "muscle_xml",
     "name_of",
     "names",
     "qpos_names",

@@ -82,6 +82,7 @@ def solve_path(
     else:
         _solve_with(method, here, there, obstacles, node, start is not None, float(tol), options, info)
     solution._finish(info[0], before)
+    solution._obstacles = tuple(obstacles)
     return solution
 
 

@@ -35,6 +35,12 @@ class SweepSolution:
     iterations: NDArray[np.int64]
     evaluations: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        good = int((self.status == Status.CONVERGED).sum())
+        share = "all" if good == len(self.status) else f"{good}"
+        span = f", length {self.length.min():.6g} to {self.length.max():.6g} m" if len(self.length) else ""
+        return f"SweepSolution({len(self.status)} poses, {share} converged{span})"
+
     @property
     def converged(self) -> bool:
         """Whether every pose has a certified path."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjwrap import html
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
@@ -87,6 +88,7 @@ class Recorder(RunLog):
             raise
         self._laid_out = False
         self._first: First | None = None
+        self._names, self._logged = list(muscles.names), 0
         self._begin(str(connect if target is None else target.path), target, self._stream.abandon)
 
     def log(self, data: Any) -> None:
@@ -98,10 +100,20 @@ class Recorder(RunLog):
         if self._ended:
             raise RecordingError(f"cannot log to '{self._place}': {self._ended}")
         added = self._buffers.add(data)
+        self._logged += added
         if added and not self._laid_out:
             self._guarded(self._lay_out)
         if (added and self._buffers.full) or (self._live and time.perf_counter() >= self._batch_due):
             self._guarded(self._flush)
+
+    def __repr__(self) -> str:
+        state = f"ended: {self._ended}" if self._ended else "open"
+        rows = f"{self._logged} state{'s' * (self._logged != 1)}"
+        return f"Recorder({self._place!r}, {len(self._names)} muscles, {rows}, {state})"
+
+    def _repr_html_(self) -> str:
+        facts = [("goes to", self._place), ("muscles", ", ".join(self._names)), ("states", self._logged)]
+        return html.facts([*facts, ("now", self._ended or "open")], "Recorder")
 
     @property
     def _empty(self) -> bool:

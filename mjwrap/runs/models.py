@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +9,7 @@ import mujoco
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import has_plugin, name_of, names, read_model
+from mjwrap.runs.angles import check_position
 
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -75,7 +75,8 @@ def start_state(
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Mapping[str, float]) -> None:
     """Reset data to a keyframe (-1: to qpos0), then set hinges and slides to positions [rad, m] by name.
 
-    Warns if a position lies outside its joint's range. Raises `ModelError` for a name that is not a hinge or slide.
+    Warns if a position lies outside its joint's range. Raises `ModelError` for a name that is not a hinge or slide, and
+    for positions that only degrees can explain (`check_position`).
     """
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
@@ -83,12 +84,7 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: M
         entry = f"{name}={value:g}"
         joint = find_joint(model, name, entry)
         data.qpos[model.jnt_qposadr[joint]] = value
-        low, high = model.jnt_range[joint]
-        if model.jnt_limited[joint] and not low <= value <= high:
-            unit = "m" if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
-            warnings.warn(
-                f"'{entry}' lies outside the joint's range, {low:g} to {high:g} {unit}", stacklevel=2
-            )
+        check_position(model, joint, value, f"'{entry}'")
 
 
 def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:

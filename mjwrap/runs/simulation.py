@@ -14,6 +14,7 @@ import numpy as np
 from mjwrap.errors import ModelError
 from mjwrap.files import Table
 from mjwrap.paths import Status
+from mjwrap.runs.control_limits import check_levels
 from mjwrap.runs.engine import MODES, start_engine
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
@@ -91,6 +92,7 @@ class Simulation:
         key = start_keyframe(engine.model, settings.keyframe)
         set_state(engine.model, engine.data, key, settings.positions)
         self.excitation = Excitation(engine.muscles, settings.excitation, settings.seed)
+        check_levels(engine.muscles.model, self.excitation)
         self.prescribed = PrescribedMotion(engine.model, settings.prescribed, option=option)
         check_free(engine.model, self.prescribed.joints, settings.positions)
 

@@ -6,7 +6,7 @@ between MuJoCo's position and acceleration stages, and under RK4 in a control ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -18,10 +18,12 @@ from mjwrap.kernels.coupling import from_python, wrenches
 from mjwrap.kernels.musculotendon import dynamics
 from mjwrap.kernels.musculotendon.dispatch import PATH_ACTUATOR
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
+from mjwrap.muscles.fibers import FiberState, fiber_state
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
 from mjwrap.system.derivatives import length_jacobian_rate
 from mjwrap.system.evaluator import Evaluator
+from mjwrap.system.moment_arms import independent_coordinates, moment_arms
 from mjwrap.system.results import Array
 from mjwrap.system.state import State
 
@@ -116,6 +118,34 @@ class MuscleSystem(Evaluator):
         )  # fmt: skip
         return jacobian
 
+    @property
+    def coordinates(self) -> list[str]:
+        """Names of the independent hinges and slides, in the model's order: the columns of `moment_arms`.
+
+        A joint that follows another by an equality of the model (`<equality><joint polycoef>`) is not independent.
+        """
+        return independent_coordinates(self.model)
+
+    def moment_arms(self, data: mujoco.MjData, coordinates: Iterable[str] | None = None) -> Array:
+        """Return moment arms (n, k) about independent joints at the present qpos [m], about a slide [-].
+
+        Joints that follow a coordinate by an equality of the model move with it, so a column is the negative slope of
+        the lengths along the coupled motion: −J N, with J = ∂l/∂q of `length_jacobian`, which is called first, and
+        N = ∂q/∂q_independent. The equalities are those that are active at the model's start; followers are taken where
+        qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the muscle's pull drives the coordinate up.
+
+        Args:
+            data: the state; only poses are used.
+            coordinates: a joint's name, or several, whose columns are returned in this order; by default all of the
+                property `coordinates`. A ball joint has three columns (rotations about the axes of its body), a free
+                joint six (translations in the world, then rotations about the body's axes), as in qvel; they are
+                returned only if they are named.
+
+        Raises:
+            GeometryError: no such joint, or it follows another one.
+        """
+        return moment_arms(self.model, self.length_jacobian(data), data.qpos, coordinates)
+
     def length_jacobian_rate(self, data: mujoco.MjData, direction: ArrayLike | None = None) -> Array:
         """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), by default along qvel.
 
@@ -145,6 +175,16 @@ class MuscleSystem(Evaluator):
             np.where(idle, PATH_ACTUATOR, plan.law), plan.params, np.where(idle, 0.0, state.activation),
             state.start.drive, state.length, np.where(idle, 0.0, state.velocity), state.fiber, constants,
         )  # fmt: skip
+
+    def fiber_state(self) -> FiberState:
+        """Return lengths, angles and forces of all fibres and tendons at the last evaluation.
+
+        After `step` and `apply` with an elastic tendon they belong to the state at the start of the step. Raises
+        `StateError` before the first evaluation.
+        """
+        plan, state, speed = self._plan, self._last, self.energetics().fiber_velocity
+        given = state.activation, state.length, state.velocity, state.fiber
+        return fiber_state(plan.law, plan.params, *given, speed)
 
     # -------------------------------------------------------------------------------------- stepping
 

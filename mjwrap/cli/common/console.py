@@ -22,7 +22,16 @@ _MYO_NOISE = (
     "Attaching a spec with an empty prefix"  # raised by myo_sim's models; matters only when they are saved
 )
 
-INPUTS = ("model", "file", "excitation", "prescribe", "states", "lengths", "moment_arms")  # name what is read
+INPUTS = (
+    "model",
+    "file",
+    "excitation",
+    "prescribe",
+    "states",
+    "lengths",
+    "moment_arms",
+    "data",
+)  # name what is read
 
 
 class _Help(argparse.HelpFormatter):

@@ -82,6 +82,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="JOINT=FILE",
         help="tables of moment arms about a joint along --states, such as OpenSim's",
     )
+    add(
+        "--data",
+        nargs="+",
+        default=[],
+        metavar="[QUANTITY=]FILE",
+        help="tables of lengths or moment arms over a joint's position, for --plot: drawn over both programs' curves, "
+        "as by mjwrap plot",
+    )
     add("--plot", metavar="FILE.png", help="plot the comparison (.png, .pdf, .svg)")
     add("--report", metavar="FILE.html", help="write a page with a table of all muscles, plots and verdicts")
     add("--csv", metavar="FILE.csv", help="write a row for every muscle and pose, without sweeps that "
@@ -102,6 +110,8 @@ def execute(options: argparse.Namespace) -> int:
 
 def settings(options: argparse.Namespace) -> CompareSettings:
     """Convert the arguments to settings; raises `UserError` if they contradict each other."""
+    if options.data and not options.plot:
+        raise UserError("--data needs a plot: add --plot")
     if options.csv_all and not options.csv:
         raise UserError("--csv-all needs a table: add --csv")
     return CompareSettings(
@@ -116,6 +126,7 @@ def settings(options: argparse.Namespace) -> CompareSettings:
         excitation=options.excitation,
         law=options.law,
         given=_given_tables(options.states, options.lengths, options.moment_arms),
+        data=options.data,
         plot=options.plot,
         page=options.report,
         csv=options.csv,

@@ -17,6 +17,7 @@ from mjwrap.cli.common.figures import need_matplotlib
 from mjwrap.cli.common.output import Report, open_output
 from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import Stages
+from mjwrap.cli.compare.data_panels import data_panels
 from mjwrap.cli.compare.rows import PoseRows, write_tables
 from mjwrap.cli.compare.text import as_values, tell_motion, tell_poses, tell_tables
 from mjwrap.comparison import (
@@ -52,8 +53,9 @@ class CompareSettings:
     `MuscleSystem`. muscles: patterns of names, None for all. samples: number of poses along a sweep, and of random
     poses. bases: number of further poses to sweep around. duration: of the simulation [s], 0 for none. excitation: as
     `Excitation` takes it. law: "mujoco" simulates both with MuJoCo's curves, "declared" mjwrap with the declared law.
-    plot, page, csv, json: files, or None; json may be "-" for standard output. csv_all: write every row to csv. check:
-    exit code 1 if a path of mjwrap is wrong. command: the command line of this comparison.
+    data: tables over a joint's position, for the plot. plot, page, csv, json: files, or None; json may be "-" for
+    standard output. csv_all: write every row to csv. check: exit code 1 if a path of mjwrap is wrong. command: the
+    command line of this comparison.
     """
 
     model: str
@@ -67,6 +69,7 @@ class CompareSettings:
     excitation: Sequence[str]
     law: str
     given: GivenTables | None
+    data: Sequence[str]
     plot: str | None
     page: str | None
     csv: str | None
@@ -91,6 +94,7 @@ def compare(settings: CompareSettings) -> int:
     given = read_tables(settings.given, model, muscles, start) if settings.given else None
     if plot is not None or page is not None:
         need_matplotlib()
+    panels = data_panels(model, settings.data, start.qpos, settings.side_rule, report.say)
     columns: list[TableColumn] = []
     tables = (
         compare_tables(model, *given, side_rule=settings.side_rule, each=columns.append)
@@ -133,7 +137,7 @@ def compare(settings: CompareSettings) -> int:
         from mjwrap.cli.compare.plot import plot_comparison
 
         title = f"{Path(settings.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
-        outputs.attempt("plot", lambda: plot_comparison(plot, title, found, motion))
+        outputs.attempt("plot", lambda: plot_comparison(plot, title, found, motion, panels))
     if page is not None:
         from mjwrap.cli.compare.page import write_page
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from mjwrap.cli.common.figures import legend_label, save_figure
+from mjwrap.cli.compare.data_panels import DataPanel
 from mjwrap.cli.compare.text import TITLES
 from mjwrap.comparison import AGREE, MotionDifference, MuscleSummary, Outcome, PoseComparison
 from mjwrap.files.atomic import PartFile
@@ -37,11 +39,12 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plot_comparison(
-    output: PartFile, title: str, found: PoseComparison, motion: MotionDifference | None
-) -> None:
-    """Plot a comparison and write the file."""
+    output: PartFile, title: str, found: PoseComparison, motion: MotionDifference | None,
+    panels: Sequence[DataPanel] = (),
+) -> None:  # fmt: skip
+    """Plot a comparison, with the muscles of given tables first, and write the file."""
     shown = _telling(found)
-    rows = len(shown) + (1 if motion is not None and motion.difference.size else 0)
+    rows = len(panels) + len(shown) + (1 if motion is not None and motion.difference.size else 0)
     both = [s for s in found.muscles.values() if not s.native_only]
     height = max(2.6 * rows, 0.19 * len(both) + 1.4, 3.0)
     figure = plt.figure(figsize=(14.0, height), layout="constrained")
@@ -51,7 +54,9 @@ def plot_comparison(
     draw_outcomes(left.subplots(), both)
     if rows:
         axes = right.subplots(rows, 2, squeeze=False)
-        for pair, summary in zip(axes, shown, strict=False):
+        for pair, panel in zip(axes, panels, strict=False):
+            panel.draw(pair, NATIVE, OWN)
+        for pair, summary in zip(axes[len(panels) :], shown, strict=False):
             draw_sweep(pair, summary, found)
         if motion is not None and motion.difference.size:
             draw_motion(axes[-1], motion)

@@ -31,7 +31,7 @@ from mjwrap.cli.common.arguments import (
     add_model,
     add_recording,
     add_serving,
-    number,
+    joint_position,
     pixels,
     positive,
     read_kinds,
@@ -67,8 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="excitation of muscles and other actuators: see above",
     )
     add("--prescribe", **several, metavar="JOINT=PATTERN|FILE", help="joints that follow a constant, sine or cosine "
-        "[rad, m] or the columns of a table, whatever forces act on them")  # fmt: skip
-    add("--qpos", **several, metavar="JOINT=VALUE", help="positions of joints at the start [rad, m]")
+        "[rad, m; 90deg] or the columns of a table, whatever forces act on them")  # fmt: skip
+    add("--qpos", **several, metavar="JOINT=VALUE", help="positions of joints at the start [rad, m; 90deg]")
     add("--strict", action="store_true", help="stop the run when the path of a muscle cannot be found")
     add("--sample", type=positive, default=0.005, metavar="S", help="time between samples of the outputs, "
         "rounded to whole time steps (default %(default)s s)")  # fmt: skip
@@ -191,6 +191,8 @@ def _positions(entries: Sequence[str]) -> dict[str, float]:
     for entry in entries:
         name, equals, text = entry.rpartition("=")
         if not equals:
-            raise UserError(f"--qpos '{entry}': write JOINT=VALUE, such as {entry}=0.5 [rad or m]")
-        found[name] = number(text, f"'{entry}'")
+            raise UserError(
+                f"--qpos '{entry}': write JOINT=VALUE, such as {entry}=0.5 [rad or m] or {entry}=30deg"
+            )
+        found[name] = joint_position(text, f"'{entry}'")
     return found

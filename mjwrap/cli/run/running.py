@@ -16,7 +16,9 @@ from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
+from mjwrap.cli.run.mistakes import warn
 from mjwrap.cli.run.run_files import OutputSettings, open_outputs
+from mjwrap.errors import ModelError
 from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
 from mjwrap.runs.engine import MODES
@@ -51,7 +53,12 @@ def run(settings: RunCommandSettings) -> int:
                 if server:
                     wanted = replace(wanted, recording=replace(wanted.recording, connect=server.connect))
                 outputs = open_outputs(wanted, settings.model, simulation.engine, held)
-            simulation.begin()
+            try:
+                simulation.begin()
+            except ModelError:  # an end lies inside a surface, which may be too large
+                warn(settings.model, simulation)
+                raise
+            warn(settings.model, simulation)
             with Interrupt() as interrupt:
                 spent = advance(simulation, outputs, interrupt)
                 closing = time.perf_counter()
