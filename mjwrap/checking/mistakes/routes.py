@@ -9,13 +9,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, muscle_of, quoted
+from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetres, muscle_of, quoted
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf import MuscleDeclaration, Route, name_of
 from mjwrap.mjcf.actuators import is_muscle
 
 Array = NDArray[np.float64]
 SAME = 1e-6  # distance of stops that count as one place, as a share of the muscle's size
+OTHER_UNIT = 20.0  # least length of fibre or tendon that is not in metres, in sizes of the muscle
 SHARP = np.cos(np.radians(150.0))  # a route that turns by more at a via site goes back where it came from
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
@@ -77,9 +78,23 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[Possi
             f"found",
             "put the hint or side site where the muscle should touch",
         )
+    yield from _of_lengths(muscle, float(posed.sizes[i]))
     for route in muscle.routes:
         yield from _of_stops(posed, i, muscle, route)
         yield from _of_side_sites(posed, muscle, route)
+
+
+def _of_lengths(muscle: MuscleDeclaration, size: float) -> Iterator[PossibleMistake]:
+    """Yield a finding for a length of fibre or tendon that is in another unit than the path."""
+    for name in ("optimal_fiber_length", "tendon_slack_length"):
+        length = getattr(muscle.parameters, name, None)
+        if length is not None and length > OTHER_UNIT * size:
+            yield PossibleMistake(
+                Mistake.PARAMETER,
+                muscle_of(muscle),
+                f"has a {name} of {millimetres(length)}, and its stops are only {millimetres(size)} apart",
+                "lengths are in metres",
+            )
 
 
 def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:
