@@ -21,8 +21,11 @@ SHARP = np.cos(np.radians(150.0))  # a route that turns by more at a via site go
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
-def route_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
-    """Yield the findings about the routes of all muscles, and about muscles that have none."""
+def route_mistakes(posed: Posed, hints: bool) -> Iterator[PossibleMistake]:
+    """Yield the findings about the routes of all muscles, and about muscles that have none.
+
+    hints: also of hints that are not met.
+    """
     muscles, model = posed.muscles, posed.model
     for actuator in range(model.nactuator):
         name = name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
@@ -46,10 +49,10 @@ def route_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
                 "if it is a copy, give it its own sites",
             )
         first.setdefault(key, muscle)
-        yield from _of_route(posed, i, muscle)
+        yield from _of_route(posed, i, muscle, hints)
 
 
-def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[PossibleMistake]:
+def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration, hints: bool) -> Iterator[PossibleMistake]:
     muscles, model = posed.muscles, posed.model
     if not posed.crossed[i].any():
         stops = {int(model.site_bodyid[r.origin]) for r in muscle.routes} | {
@@ -69,7 +72,7 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[Possi
             f"has no path at the reference pose: {muscles.reason(i)}",
             "move its sites out of the surface, or make the surface smaller",
         )
-    elif muscles.unmet_hints(i):
+    elif hints and muscles.unmet_hints(i):
         geoms = ", ".join(muscles.unmet_hints(i))
         yield PossibleMistake(
             Mistake.SIDE,
@@ -114,9 +117,9 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
                 + (f"{names[a]} and {names[b]}" if names[a] != names[b] else f"{names[a]}, twice"),
                 "leave one of them out, or give the site its own position",
             )
-    points = posed.muscles.points(i) if posed.found[i] else np.empty((0, 3))
+    straights = posed.straights(i) if posed.found[i] else np.empty((0, 2, 3))
     for k in sites[1:-1]:
-        if _turns_back(points, places[k], SAME * posed.sizes[i]):
+        if _turns_back(straights, places[k], SAME * posed.sizes[i]):
             yield PossibleMistake(
                 Mistake.TURNS_BACK,
                 muscle_of(muscle),
@@ -125,18 +128,13 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
             )
 
 
-def _turns_back(points: Array, site: Array, near: float) -> bool:
-    """Return whether a drawn path (m, 3) goes back, at a via site, nearly where it came from."""
-    away = np.linalg.norm(points - site, axis=1)
-    if not len(away) or not np.nanmin(away) <= near:
-        return False
-    k = int(np.nanargmin(away))
-    before = next((p for p in points[k::-1] if np.linalg.norm(p - site) > near), None)
-    after = next((p for p in points[k:] if np.linalg.norm(p - site) > near), None)
-    if before is None or after is None:
-        return False
-    there, onwards = site - before, after - site
-    return float(there @ onwards) < SHARP * float(np.linalg.norm(there) * np.linalg.norm(onwards))
+def _turns_back(straights: Array, site: Array, near: float) -> bool:
+    """Return whether a path of straight segments (m, 2, 3) goes back, at a via site, nearly where it came from."""
+    for (a, b), (c, d) in itertools.pairwise(straights):
+        if np.linalg.norm(b - site) <= near and np.linalg.norm(c - site) <= near:
+            length = float(np.linalg.norm(b - a) * np.linalg.norm(d - c))
+            return length > 0.0 and float((b - a) @ (d - c)) < SHARP * length
+    return False
 
 
 def _of_side_sites(posed: Posed, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:
