@@ -95,7 +95,7 @@ def _size(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration
 @contextmanager
 def evaluated(muscles: MuscleSystem, qpos: Array) -> Iterator[Posed]:
     """Give the muscles at a pose (nq,) inside a with block, and restore their last results after it."""
-    last, strict = muscles._evaluation(), muscles.strict
+    last, strict = muscles._last, muscles.strict
     muscles.strict = False
     try:
         yield Posed(muscles, qpos)
