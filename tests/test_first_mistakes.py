@@ -101,6 +101,10 @@ CASES: dict[str, Case] = {
         )] + [('size=".022 .04"', 'size="22 40"'), ('data=".012 .004"', 'data="12 4"')],
         INSPECT, 0, ["model has muscles that are", "gravity", "in metres"],
     ),
+    "fibre length in millimetres": Case(
+        [('data=".11"', 'data="110"')],
+        INSPECT, 0, ["muscle 'BIC'", "optimal_fiber_length of 110 m", "lengths are in metres"],
+    ),
     "ring beside the path": Case(
         [('pos=".029 0 -.2"', 'pos=".08 0 -.2"')],
         INSPECT, 0, ["geom 'sling' is a ring", "muscle 'BIC'", "inner side of its tube"],
@@ -158,6 +162,9 @@ CASES: dict[str, Case] = {
     "range in degrees, read as radians": Case(
         [('angle="degree"', 'angle="radian"')],
         INSPECT, 0, ["joint 'elbow'", "0 to 130 rad", 'leave out <compiler angle="radian"/>'],
+    ),
+    "range with its ends exchanged": Case(
+        [('range="0 130"', 'range="130 0"')], INSPECT, 0, ["joint 'elbow'", "down to 0", "write its lower end first"]
     ),
     "keyframe in degrees": Case(
         [("<actuator/>", '<keyframe><key name="bent" qpos="90 0"/></keyframe>')],

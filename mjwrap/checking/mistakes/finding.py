@@ -34,6 +34,7 @@ class Mistake(enum.StrEnum):
     TURNS_BACK = "route turns back"
     JOINT_RANGE = "joint range"
     KEYFRAME = "keyframe in degrees"
+    PARAMETER = "length of fibre or tendon"
     UNITS = "units"
 
 

@@ -22,9 +22,16 @@ def joint_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
     model = posed.model
     used = {int(model.dof_jntid[d]) for d in np.flatnonzero(posed.crossed.any(axis=0))}
     for joint in sorted(used):
+        low, high = (float(x) for x in model.jnt_range[joint])
+        if low > high:
+            yield PossibleMistake(
+                Mistake.JOINT_RANGE,
+                quoted(model, "joint", joint),
+                f"has a range from {low:.4g} down to {high:.4g}, which MuJoCo does not enforce",
+                "write its lower end first",
+            )
         if int(model.jnt_type[joint]) != _HINGE or not model.jnt_limited[joint]:
             continue
-        low, high = (float(x) for x in model.jnt_range[joint])
         if joint in posed.couplings.leader:
             continue
         if high - low > TURNS:

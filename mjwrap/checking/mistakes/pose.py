@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.model.kinematic_tree import crossed_dofs
@@ -39,6 +40,7 @@ class Posed:
         self.couplings = CoupledJoints(self.model)
         self.turning = turning_dofs(self.model)
         self.touched = self._touched()
+        self._straights = self._all_straights()
 
     def _touched(self) -> list[list[bool]]:
         """Return for each muscle, by its geoms in order, whether its path touches them."""
@@ -50,6 +52,23 @@ class Posed:
                 if plan.links[k, muscle_paths.L_GEOM] >= 0:
                     touched = int(node[k, layout.S_MODE]) == layout.TOUCHED
                     found[int(row[muscle_paths.R_MUSCLE])].append(touched)
+        return found
+
+    def straights(self, i: int) -> Array:
+        """Return the straight segments of muscle i, (m, 2, 3) world [m], as evaluated at the pose.
+
+        Read from the evaluation itself: a drawing of the path would have to be compiled.
+        """
+        return self._straights[i]
+
+    def _all_straights(self) -> list[Array]:
+        state, plan = self.muscles._evaluation(), self.muscles._plan
+        found: list[Array] = [np.empty((0, 2, 3)) for _ in range(self.muscles.n)]
+        for c, row in enumerate(plan.routes):
+            first, i = int(row[muscle_paths.R_LO]) + c, int(row[muscle_paths.R_MUSCLE])
+            rows = state.segments[first : first + int(state.count[c])]
+            ends = [rows[:, column : column + 3] for column in (segments.G_A, segments.G_B)]
+            found[i] = np.concatenate([found[i], np.stack(ends, axis=1)])
         return found
 
     def slopes(self, qpos: Array, tangent: Array) -> Array:
@@ -76,7 +95,7 @@ def _size(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration
 @contextmanager
 def evaluated(muscles: MuscleSystem, qpos: Array) -> Iterator[Posed]:
     """Give the muscles at a pose (nq,) inside a with block, and restore their last results after it."""
-    last, strict = muscles._evaluation(), muscles.strict
+    last, strict = muscles._last, muscles.strict
     muscles.strict = False
     try:
         yield Posed(muscles, qpos)

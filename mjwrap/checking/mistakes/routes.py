@@ -9,19 +9,23 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, muscle_of, quoted
+from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetres, muscle_of, quoted
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf import MuscleDeclaration, Route, name_of
 from mjwrap.mjcf.actuators import is_muscle
 
 Array = NDArray[np.float64]
 SAME = 1e-6  # distance of stops that count as one place, as a share of the muscle's size
+OTHER_UNIT = 20.0  # least length of fibre or tendon that is not in metres, in sizes of the muscle
 SHARP = np.cos(np.radians(150.0))  # a route that turns by more at a via site goes back where it came from
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
-def route_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
-    """Yield the findings about the routes of all muscles, and about muscles that have none."""
+def route_mistakes(posed: Posed, hints: bool) -> Iterator[PossibleMistake]:
+    """Yield the findings about the routes of all muscles, and about muscles that have none.
+
+    hints: also of hints that are not met.
+    """
     muscles, model = posed.muscles, posed.model
     for actuator in range(model.nactuator):
         name = name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
@@ -45,10 +49,10 @@ def route_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
                 "if it is a copy, give it its own sites",
             )
         first.setdefault(key, muscle)
-        yield from _of_route(posed, i, muscle)
+        yield from _of_route(posed, i, muscle, hints)
 
 
-def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[PossibleMistake]:
+def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration, hints: bool) -> Iterator[PossibleMistake]:
     muscles, model = posed.muscles, posed.model
     if not posed.crossed[i].any():
         stops = {int(model.site_bodyid[r.origin]) for r in muscle.routes} | {
@@ -68,7 +72,7 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[Possi
             f"has no path at the reference pose: {muscles.reason(i)}",
             "move its sites out of the surface, or make the surface smaller",
         )
-    elif muscles.unmet_hints(i):
+    elif hints and muscles.unmet_hints(i):
         geoms = ", ".join(muscles.unmet_hints(i))
         yield PossibleMistake(
             Mistake.SIDE,
@@ -77,9 +81,23 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration) -> Iterator[Possi
             f"found",
             "put the hint or side site where the muscle should touch",
         )
+    yield from _of_lengths(muscle, float(posed.sizes[i]))
     for route in muscle.routes:
         yield from _of_stops(posed, i, muscle, route)
         yield from _of_side_sites(posed, muscle, route)
+
+
+def _of_lengths(muscle: MuscleDeclaration, size: float) -> Iterator[PossibleMistake]:
+    """Yield a finding for a length of fibre or tendon that is in another unit than the path."""
+    for name in ("optimal_fiber_length", "tendon_slack_length"):
+        length = getattr(muscle.parameters, name, None)
+        if length is not None and length > OTHER_UNIT * size:
+            yield PossibleMistake(
+                Mistake.PARAMETER,
+                muscle_of(muscle),
+                f"has a {name} of {millimetres(length)}, and its stops are only {millimetres(size)} apart",
+                "lengths are in metres",
+            )
 
 
 def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:
@@ -99,9 +117,9 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
                 + (f"{names[a]} and {names[b]}" if names[a] != names[b] else f"{names[a]}, twice"),
                 "leave one of them out, or give the site its own position",
             )
-    points = posed.muscles.points(i) if posed.found[i] else np.empty((0, 3))
+    straights = posed.straights(i) if posed.found[i] else np.empty((0, 2, 3))
     for k in sites[1:-1]:
-        if _turns_back(points, places[k], SAME * posed.sizes[i]):
+        if _turns_back(straights, places[k], SAME * posed.sizes[i]):
             yield PossibleMistake(
                 Mistake.TURNS_BACK,
                 muscle_of(muscle),
@@ -110,18 +128,13 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
             )
 
 
-def _turns_back(points: Array, site: Array, near: float) -> bool:
-    """Return whether a drawn path (m, 3) goes back, at a via site, nearly where it came from."""
-    away = np.linalg.norm(points - site, axis=1)
-    if not len(away) or not np.nanmin(away) <= near:
-        return False
-    k = int(np.nanargmin(away))
-    before = next((p for p in points[k::-1] if np.linalg.norm(p - site) > near), None)
-    after = next((p for p in points[k:] if np.linalg.norm(p - site) > near), None)
-    if before is None or after is None:
-        return False
-    there, onwards = site - before, after - site
-    return float(there @ onwards) < SHARP * float(np.linalg.norm(there) * np.linalg.norm(onwards))
+def _turns_back(straights: Array, site: Array, near: float) -> bool:
+    """Return whether a path of straight segments (m, 2, 3) goes back, at a via site, nearly where it came from."""
+    for (a, b), (c, d) in itertools.pairwise(straights):
+        if np.linalg.norm(b - site) <= near and np.linalg.norm(c - site) <= near:
+            length = float(np.linalg.norm(b - a) * np.linalg.norm(d - c))
+            return length > 0.0 and float((b - a) @ (d - c)) < SHARP * length
+    return False
 
 
 def _of_side_sites(posed: Posed, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:

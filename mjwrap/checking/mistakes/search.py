@@ -19,7 +19,7 @@ from mjwrap.system import MuscleSystem
 
 
 def possible_mistakes(
-    muscles: MuscleSystem, *, rest: ArrayLike | None = None, sweep: bool = True
+    muscles: MuscleSystem, *, rest: ArrayLike | None = None, sweep: bool = True, hints: bool = True
 ) -> list[PossibleMistake]:
     """Find what is legal in a model and yet probably not meant.
 
@@ -29,6 +29,7 @@ def possible_mistakes(
         muscles: the muscles.
         rest: (nq,) the pose at which paths and moment arms are judged; qpos0 if None.
         sweep: also move each joint over its range, to find moment arms that change sign.
+        hints: also find hints that are not met at the pose. Without it nothing has to be compiled after an evaluation.
 
     Returns:
         The findings: first of elements that nothing reads, then of joints, surfaces, routes and moment arms.
@@ -41,14 +42,14 @@ def possible_mistakes(
     if qpos.shape != (model.nq,):
         raise StateError(f"the rest pose must have shape ({model.nq},), not {qpos.shape}")
     with evaluated(muscles, qpos) as posed:
-        return list(_search(posed, sweep))
+        return list(_search(posed, sweep, hints))
 
 
-def _search(posed: Posed, sweep: bool) -> Iterator[PossibleMistake]:
+def _search(posed: Posed, sweep: bool, hints: bool) -> Iterator[PossibleMistake]:
     yield from unread_elements(posed.model)
     yield from joint_mistakes(posed)
     yield from surface_mistakes(posed)
-    yield from route_mistakes(posed)
+    yield from route_mistakes(posed, hints)
     yield from moment_arm_mistakes(posed)
     if sweep:
         yield from sign_changes(posed)

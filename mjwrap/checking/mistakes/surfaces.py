@@ -150,11 +150,10 @@ def _with_previous(elements: list[tuple[int, int]]) -> Iterator[tuple[int, tuple
 
 
 def _threads(posed: Posed, i: int, node: Node) -> bool:
-    """Return whether a muscle's path crosses the disc of a ring: |z| = 0 within its major radius."""
-    points = posed.muscles.points(i)
+    """Return whether a straight segment of a muscle crosses the disc of a ring: z = 0 within its major radius."""
     turn = posed.poses.geom_xmat[node.geom].reshape(3, 3)
-    local = (points - posed.poses.geom_xpos[node.geom]) @ turn
-    a, b = local[:-1], local[1:]
+    local = (posed.straights(i) - posed.poses.geom_xpos[node.geom]) @ turn
+    a, b = local[:, 0], local[:, 1]
     with np.errstate(invalid="ignore", divide="ignore"):
         share = a[:, 2] / (a[:, 2] - b[:, 2])
         crossing = (a[:, 2] > 0.0) != (b[:, 2] > 0.0)

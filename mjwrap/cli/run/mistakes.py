@@ -15,9 +15,8 @@ LEFT_OUT = (Mistake.SIDE, Mistake.SAME_ROUTE, Mistake.ON_JOINT, Mistake.NO_PATH)
 def warn(model: str, simulation: Simulation) -> None:
     """Print the possible mistakes that can be seen at the start pose to standard error."""
     rest = simulation.engine.data.qpos
-    found = [
-        m for m in possible_mistakes(simulation.muscles, rest=rest, sweep=False) if m.kind not in LEFT_OUT
-    ]
+    searched = possible_mistakes(simulation.muscles, rest=rest, sweep=False, hints=False)
+    found = [mistake for mistake in searched if mistake.kind not in LEFT_OUT]
     for mistake in found[:MOST]:
         print(f"mjwrap run: warning: {mistake}", file=sys.stderr)
     if len(found) > MOST:
