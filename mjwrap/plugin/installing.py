@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model, with_remedy
+from mjwrap.mjcf import (
+    MuscleDeclaration,
+    is_binary,
+    marks,
+    read_declarations,
+    read_model,
+    read_spec,
+    with_remedy,
+)
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
 from mjwrap.model.takeover import Takeover
@@ -159,7 +166,7 @@ def load(
     """Load an MJCF file and `install` the engine plugin, or load an MJB file of a model that has the plugin.
 
     Args:
-        path: the file.
+        path: the file; or "mjwrap:NAME", a model that comes with mjwrap, or "myo_sim:NAME", one of the myo-sim package.
         mode: as in `install`; "wrench" if None. An MJB file has its own mode.
         keep_tendons: as in `install`; only for MJCF files.
         side_rule: as in `install`; an MJB file has its own rule.
@@ -175,9 +182,8 @@ def load(
     register()
     model = read_model(path)
     renumber(model)
-    if Path(path).suffix != ".mjb":
-        spec = mujoco.MjSpec.from_file(os.fspath(path))
-        return install(spec, mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
+    if not is_binary(path):
+        return install(read_spec(path), mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
     instances = own_instances(model)
     saved = [configuration_at(model._address, i) for i in instances]
     modes, rules = {each.mode for each in saved}, {each.side_rule for each in saved}

@@ -70,7 +70,7 @@ class Simulation:
     the results at the last sample.
 
     Args:
-        source: an MJCF or MJB file, or "myo_sim:NAME".
+        source: an MJCF or MJB file, "mjwrap:NAME" or "myo_sim:NAME".
         settings: the settings of the run.
         option: name of the command-line option for prescribed joints, for messages.
 
@@ -173,7 +173,7 @@ def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[s
     """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
 
     Args:
-        source: an MJCF or MJB file, or "myo_sim:NAME".
+        source: an MJCF or MJB file, "mjwrap:NAME" or "myo_sim:NAME".
         settings: the settings of the run; None for the defaults.
         kinds: the quantities in the table, such as "qpos", "length" or "moment_arm", as for `mjwrap run --columns`.
 

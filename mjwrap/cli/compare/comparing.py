@@ -48,7 +48,7 @@ class GivenTables:
 class CompareSettings:
     """The settings of `mjwrap compare`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the start pose, None for qpos0. side_rule: of mjwrap's paths, as for
+    model: a file or a model by name. keyframe: the start pose, None for qpos0. side_rule: of mjwrap's paths, as for
     `MuscleSystem`. muscles: patterns of names, None for all. samples: number of poses along a sweep, and of random
     poses. bases: number of further poses to sweep around. duration: of the simulation [s], 0 for none. excitation: as
     `Excitation` takes it. law: "mujoco" simulates both with MuJoCo's curves, "declared" mjwrap with the declared law.

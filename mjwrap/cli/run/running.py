@@ -28,7 +28,7 @@ from mjwrap.text import counted
 class RunCommandSettings:
     """The settings of `mjwrap run`.
 
-    model: a file, or "myo_sim:NAME". serve_port: port on which the run is served to a browser, or None. json: a file
+    model: a file or a model by name. serve_port: port on which the run is served to a browser, or None. json: a file
     for the report as values, "-" for standard output, or None.
     """
 
