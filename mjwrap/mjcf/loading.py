@@ -43,7 +43,7 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
     file = own_file(text) if text.startswith(OWN) else Path(text)
     if not file.is_file():
         if file.suffix.lower() == ".osim":
-            raise ModelError(f"{file} {OPENSIM}")
+            raise ModelError(f"{file} does not exist; by its name it {OPENSIM}")
         folder, what = (file, "is a folder") if file.is_dir() else (file.parent, "does not exist")
         if not folder.is_dir():
             raise ModelError(f"model file {file} does not exist, nor does the folder {folder}")
@@ -53,7 +53,7 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
     if not os.access(file, os.R_OK):
         raise ModelError(f"model file {file} cannot be read: permission denied")
     if kind := foreign(file):
-        raise ModelError(f"{file} {kind}")
+        raise ModelError(f"{file} is not a model that MuJoCo can load: it {kind}")
     load = mujoco.MjModel.from_binary_path if is_binary(file) else mujoco.MjModel.from_xml_path
     with _collected_warnings() as found:
         try:
