@@ -151,8 +151,8 @@ def test_taken_over_muscles_pull_as_native_ones() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"prm": PRM[:8]}, "prm must be nine numbers"),
-        ({"passive": PRM[:8]}, "passive prm must be nine numbers"),
+        ({"prm": PRM[:8]}, "prm must be 9 numbers"),
+        ({"passive": PRM[:8]}, "passive prm must be 9 numbers"),
         ({"passive": (1.05, 0.75, *PRM[2:])}, "passive range must be above 1.05, not 0.75"),
         *(({"prm": (*PRM[:k], math.nan, *PRM[k + 1 :])}, "must be finite, not nan") for k in range(9)),
         ({"prm": (1.05, 0.75, *PRM[2:])}, "range must be above 1.05, not 0.75"),

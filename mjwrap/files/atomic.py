@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
 
-from mjwrap.errors import RecordingError
+from mjwrap.errors import MjwrapError, RecordingError
 from mjwrap.files.leftovers import part_name, remove_leftovers
 
 if TYPE_CHECKING:
@@ -224,11 +224,12 @@ def uninterrupted() -> Iterator[None]:
         previous[received[0]](*received)
 
 
-def as_path(path: object) -> str:
-    """Return the name of an output file as text; `RecordingError` if it is neither text nor a path."""
+def as_path(path: object, error: type[MjwrapError] = RecordingError) -> str:
+    """Return the name of a file as text; `error` if it is neither text nor a path."""
     text = os.fspath(path) if isinstance(path, str | os.PathLike) else None
-    require("path", path, isinstance(text, str), "the name of a file, as str or Path")
-    return str(text)
+    if not isinstance(text, str):
+        raise error(f"path must be the name of a file, as str or Path, not {path!r}")
+    return text
 
 
 def _make_folder(folder: Path) -> None:

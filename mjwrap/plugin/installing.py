@@ -6,6 +6,7 @@ import os
 
 import mujoco
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import (
     MuscleDeclaration,
@@ -70,11 +71,8 @@ def install(
             rule.
         VersionError: the layout of the installed MuJoCo could not be verified.
     """
-    if not isinstance(spec, mujoco.MjSpec):
-        raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
-    if mode not in MODES:
-        raise ModelError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
-    check_side_rule(side_rule)
+    validation.of_type(spec, "MjSpec", "spec", ModelError)
+    _check_options(mode, keep_tendons, side_rule)
     register()
     with undone_on_error(spec):
         return _installed(spec, mode, keep_tendons, side_rule)
@@ -178,7 +176,7 @@ def load(
         ModelError: as in `install`, or the file cannot be loaded, or an MJB file has another mode or rule.
         VersionError: the layout of the installed MuJoCo could not be verified.
     """
-    check_side_rule(side_rule)
+    _check_options(WRENCH if mode is None else mode, keep_tendons, side_rule)
     register()
     model = read_model(path)
     renumber(model)
@@ -202,6 +200,14 @@ def load(
             f"{path} does not contain mjwrap's plugin, and an MJB file cannot be changed; load its XML instead"
         )
     return model
+
+
+def _check_options(mode: str, keep_tendons: bool, side_rule: int | None) -> None:
+    if not isinstance(mode, str) or mode not in MODES:
+        shown = validation.described(mode)
+        raise ModelError(f"mode {shown} does not exist; modes: {', '.join(MODES)}")
+    validation.flag(keep_tendons, "keep_tendons", ModelError)
+    check_side_rule(side_rule)
 
 
 def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:

@@ -284,8 +284,9 @@ class Cone(Surface):
 
     def __post_init__(self) -> None:
         for name in ("bottom_radius", "top_radius"):
-            if getattr(self, name) != 0.0:
-                positive(self, name, getattr(self, name))
+            value = getattr(self, name)
+            if not isinstance(value, int | float) or value != 0.0:
+                positive(self, name, value)
         positive(self, "half_length", self.half_length)
         if abs(self.dims[1]) < FLATTEST_CONE:
             raise GeometryError(

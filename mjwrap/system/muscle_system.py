@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import from_python, wrenches
@@ -154,8 +155,8 @@ class MuscleSystem(Evaluator):
         Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds only the forces of other code.
         Raises `StateError` if the state is not finite, or if MuJoCo resets it because the motion became unstable.
         """
-        if nstep < 0:
-            raise StateError(f"nstep must not be negative, got {nstep}")
+        if not (isinstance(nstep, int | np.integer) and nstep >= 0):
+            raise StateError(f"nstep must be a whole number, not negative, got {validation.described(nstep)}")
         state = self._state(data)
         before = resets(data)
         runge_kutta = int(self.model.opt.integrator) == _RK4

@@ -181,9 +181,10 @@ class Results:
         return "\n".join(lines)
 
     def _known(self, i: int) -> int:
-        if not 0 <= i < self.n:
+        if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
             raise GeometryError(
-                f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}"
+                f"i: muscle {validation.described(i)} does not exist; "
+                f"there are {self.n}: {', '.join(self.names) or 'none'}"
             )
         return int(i)
 
