@@ -169,6 +169,7 @@ def hill_from_mujoco(
     Raises:
         ModelError: a parameter is not possible.
     """
+    validation.instance(law, MuJoCoMuscle, "law", ModelError, "a MuJoCoMuscle")
     if law.prm[2] < 0.0 and not law.acc0 > 0.0:
         raise ModelError(f"force must be scale/acc0, but acc0 is {law.acc0!r}")
     short, long = law.length_range

@@ -45,7 +45,7 @@ class ActivationDynamics:
             "smoothing": self.smoothing,
         }
         for name, value in values.items():
-            if value is not None:
+            if value is not None or name == "smoothing":
                 validation.positive(value, name, ModelError)
 
     @property

@@ -65,7 +65,7 @@ class Umberger2010:
             validation.flag(getattr(self, name), f"Umberger2010: {name}", ModelError)
         for name in ("specific_tension", "density", "mass"):
             value = getattr(self, name)
-            if value is not None:
+            if value is not None or name != "mass":
                 validation.positive(value, f"Umberger2010: {name}", ModelError)
         for name in ("aerobic_factor", "minimum_heat_rate", "effort"):
             validation.not_negative(getattr(self, name), f"Umberger2010: {name}", ModelError)
@@ -153,6 +153,13 @@ def metabolic_constants(
     Raises:
         ModelError: the numbers of models and muscles differ.
     """
+    several = isinstance(model, Sequence) and all(
+        each is None or isinstance(each, Umberger2010) for each in model
+    )
+    good = (
+        model is None or isinstance(model, Umberger2010) or (several and not isinstance(model, str | bytes))
+    )
+    validation.require(good, "metabolism", "an Umberger2010, one for each muscle, or None", model, ModelError)
     models = [model] * len(law) if model is None or isinstance(model, Umberger2010) else list(model)
     if len(models) != len(law):
         raise ModelError(

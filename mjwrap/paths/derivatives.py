@@ -135,7 +135,7 @@ class Derivatives:
         Raises `GeometryError` as `stiffness` does, and for a direction with a wrong shape or that is not finite.
         """
         count, points = self._path_points("stiffness")
-        given = np.array(direction, dtype=np.float64)
+        given = validation.numbers(direction, "direction", GeometryError).copy()
         shape = (len(self.contacts) + 2, 6)
         if given.shape != shape or not np.isfinite(given).all():
             raise GeometryError(f"direction must be finite and have shape {shape}, not {given.shape}")

@@ -159,7 +159,7 @@ class ImplicitSurface(CustomSurface):
 
 def _range(label: str, name: str, value: Sequence[float]) -> tuple[float, float]:
     try:
-        low, high = (float(end) for end in value)
+        low, high = (float(end) for end in (() if isinstance(value, str | bytes) else value))
         good = math.isfinite(low) and math.isfinite(high) and low < high
     except (TypeError, ValueError):
         low = high = 0.0

@@ -57,7 +57,7 @@ class Evaluator(Results):
 
     @excitation.setter
     def excitation(self, values: ArrayLike) -> None:
-        given = np.asarray(values, dtype=np.float64)
+        given = validation.numbers(values, "excitation", StateError)
         if given.shape != self._excitation.shape:
             wanted = self._excitation.shape
             raise StateError(f"excitation must have shape {wanted}, one for each muscle, not {given.shape}")

@@ -253,7 +253,8 @@ class MuscleSystem(Evaluator):
     def set_branch(self, data: mujoco.MjData, branch: ArrayLike) -> None:
         """Restore what `branch` returned, also for another MjData of the model; else `StateError`."""
         state = self._state(data)
-        given, rows = np.asarray(branch, dtype=np.float64), state.node[:, layout.S_MODE :][:, : layout.STATE]
+        given = validation.numbers(branch, "branch", StateError)
+        rows = state.node[:, layout.S_MODE :][:, : layout.STATE]
         if given.shape != (rows.size + state.own.size,):
             raise StateError(
                 f"branch must have shape ({rows.size + state.own.size},) as branch() returns it, not {given.shape}"

@@ -159,12 +159,14 @@ class Results:
 
     def index(self, name: str) -> int:
         """Return the index of a muscle by name; `GeometryError`, which lists the names, if there is no such muscle."""
-        if name not in self.names:
-            raise GeometryError(f"no muscle '{name}'; muscles: {', '.join(self.names) or 'none'}")
+        if not isinstance(name, str) or name not in self.names:
+            shown = f"'{name}'" if isinstance(name, str) else f"of the name {validation.described(name)}"
+            raise GeometryError(f"no muscle {shown}; muscles: {', '.join(self.names) or 'none'}")
         return self.names.index(name)
 
     def reason(self, i: int) -> str:
         """Return why muscle i last had no path, naming the elements; empty if it always had one."""
+        i = self._known(i)
         code = int(self._evaluation().last_failure[i])
         detail = self._evaluation().details[i]
         return (Status(code).message + (f" ({detail})" if detail else "")) if code else ""
