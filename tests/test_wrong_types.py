@@ -16,6 +16,7 @@ from mjwrap import plugin
 from mjwrap.runs import load
 
 PRM = (0.75, 1.05, 100.0, 0.0, 0.5, 1.6, 1.5, 1.3, 1.2)
+SHAPES = ("capsule", "cone", "cylinder", "ellipsoid", "elliptic_cylinder", "sphere", "torus")
 TIME = np.linspace(0.0, 0.1, 5)
 BALL = mw.Obstacle(mw.Sphere(0.03))
 ENDS = ((0.1, 0.0, 0.0), (-0.1, 0.02, 0.03))
@@ -121,8 +122,7 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "solve_sweep": (*ENDS, [BALL], np.zeros((2, 1, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1, 1))),
         "write_table": (folder / "u.csv", TABLE),
     }
-    shapes = ("capsule", "cone", "cylinder", "ellipsoid", "elliptic_cylinder", "sphere", "torus")
-    fixed |= {f"fit_{shape}": (POINTS,) for shape in shapes}
+    fixed |= {f"fit_{shape}": (POINTS,) for shape in SHAPES}
     found: dict[str, Callable[[], Call]] = {
         name: lambda name=name, arguments=arguments: Call(getattr(mw, name), arguments)
         for name, arguments in fixed.items()
@@ -197,6 +197,7 @@ def wrong(
 
 # with legal values, which other tests give
 EXPENSIVE = {"ImplicitSurface", "ParametricSurface", "implausible", "length_ranges", "set_length_ranges"}
+EXPENSIVE |= {f"fit_{shape}" for shape in SHAPES}
 RESULTS = {  # that functions return; nobody makes them
     "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "LengthRange", "MuscleTrial",
     "ParameterReport", "PathSolution", "Status", "SweepSolution",

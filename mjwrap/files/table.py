@@ -45,8 +45,8 @@ class Table:
         names = _names(self.names, where)
         if time.ndim != 1 or values.shape != (len(time), len(names)):
             raise TableError(
-                f"{where}time, names, values: times of shape {time.shape} and {len(names)} names do not fit values of shape "
-                f"{values.shape}"
+                f"{where}time, names, values: times of shape {time.shape} and {len(names)} names do not fit "
+                f"values of shape {values.shape}"
             )
         check_names(names, where)
         late = np.flatnonzero(~(np.diff(time) > 0.0))
