@@ -12,6 +12,7 @@ import mujoco
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.file_kinds import OPENSIM, foreign
+from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, nearest, own_file, own_models
 from mjwrap.mjcf.names import listed
 
@@ -60,10 +61,19 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
             model = load(os.fspath(file))
         except (ValueError, mujoco.FatalError) as error:
             reason = with_remedy(" ".join("; ".join([*found, str(error)]).split()))
+            reason = with_candidates(reason, _parsed(file))
             raise ModelError(f"{file} is not a model that MuJoCo can load: {reason}") from None
     for text in found:
         warnings.warn(f"{file}: {text}", stacklevel=2)
     return model
+
+
+def _parsed(file: Path) -> mujoco.MjSpec | None:
+    """Return the spec of a file that does not compile, None if it cannot even be parsed."""
+    try:
+        return None if is_binary(file) else mujoco.MjSpec.from_file(os.fspath(file))
+    except (ValueError, mujoco.FatalError):
+        return None
 
 
 def _source(path: object) -> str:

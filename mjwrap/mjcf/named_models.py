@@ -82,10 +82,10 @@ def myo_model(source: str) -> mujoco.MjModel:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ", did you mean ...?" with the known names that resemble a name, or an empty string."""
-    close = difflib.get_close_matches(name.lower(), {each.lower(): each for each in known}, n=3, cutoff=0.6)
-    found = [each for each in known if each.lower() in close]
-    return f" (did you mean {' or '.join(repr(each) for each in found)}?)" if found else ""
+    """Return " (did you mean ...?)" with the known names that resemble a name, the best first, or an empty string."""
+    by_lower = {each.lower(): each for each in known}
+    close = [by_lower[each] for each in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.6)]
+    return f" (did you mean {' or '.join(repr(each) for each in close)}?)" if close else ""
 
 
 def _broken(source: str, error: Exception) -> ModelError:

@@ -18,6 +18,7 @@ from mjwrap.mjcf import (
     with_remedy,
 )
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
+from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
@@ -219,6 +220,8 @@ def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
         told = (
             str(reason)
             if reason
-            else with_remedy(f"the model does not compile: {' '.join(str(error).split())}")
+            else with_candidates(
+                with_remedy(f"the model does not compile: {' '.join(str(error).split())}"), spec
+            )
         )
         raise ModelError(told) from reason

@@ -16,6 +16,7 @@ from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
+from mjwrap.cli.run.ending import UNSAVED, ended, positions, undriven
 from mjwrap.cli.run.run_files import OutputSettings, open_outputs
 from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
@@ -121,8 +122,14 @@ def tell(
         report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
+    report.say(ended(simulation))
+    if sentence := undriven(simulation):
+        report.say(sentence)
     for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
+    wanted = settings.outputs
+    if not (wanted.files or wanted.recording.wanted or settings.json or settings.serve_port):
+        report.say(UNSAVED)
 
 
 def facts(
@@ -140,6 +147,8 @@ def facts(
         "integrator": _integrator(engine.model),
         "timestep": float(engine.model.opt.timestep),
         "simulated": float(engine.data.time),
+        "positions": positions(simulation),
+        "undriven": undriven(simulation),
         "wall": spent.simulation,
         "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,
