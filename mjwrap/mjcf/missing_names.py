@@ -10,8 +10,6 @@ from mjwrap.mjcf.named_models import nearest
 from mjwrap.mjcf.names import listed
 
 _MISSING = re.compile(r"(?P<kind>[\w ]*?)\s*'(?P<name>[^']*)' (?:not found )?in \w+ \d+")
-    r"(?P<kind>[\w ]*?)\s*'(?P<name>[^']*)' (?:not found )?in (?:tuple|tendon|wrap|actuator|\w+) (?P<id>\d+)"
-)
 _LISTED = 12  # names to list where none resembles the missing one
 
 
