@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -20,6 +21,7 @@ from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
+from mjwrap.runs.table_spans import uncovered
 
 CONTROLS_AT = 101  # times at which `Simulation.driven` looks
 Log = Callable[[mujoco.MjData], object]  # called with the state of a sample
@@ -98,6 +100,9 @@ class Simulation:
         self.excitation = Excitation(engine.muscles, settings.excitation, settings.seed)
         self.prescribed = PrescribedMotion(engine.model, settings.prescribed, option=option)
         check_free(engine.model, self.prescribed.joints, settings.positions)
+        entries = (*settings.excitation, *settings.prescribed)
+        if told := uncovered(entries, self.duration, self._timestep):
+            warnings.warn(told, stacklevel=2)
 
     @property
     def duration(self) -> float:

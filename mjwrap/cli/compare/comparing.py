@@ -90,7 +90,7 @@ def compare(settings: CompareSettings) -> int:
     report = Report(settings.json)
     given = read_tables(settings.given, model, muscles, start) if settings.given else None
     if plot is not None or page is not None:
-        need_matplotlib()
+        need_matplotlib("--plot" if plot is not None else "--report")
     columns: list[TableColumn] = []
     tables = (
         compare_tables(model, *given, side_rule=settings.side_rule, each=columns.append)

@@ -70,7 +70,7 @@ def run(settings: RunCommandSettings) -> int:
             )
             return interrupt.asked.code
         if server:
-            told = "mjwrap run: the run is complete and still served; press Ctrl-C to stop"
+            told = f"mjwrap run: the run is complete and still served; press Ctrl-C to stop\n{_open(server)}"
             served = serve_until_stopped(server, lambda: print(told, file=sys.stderr))
             return served or (RUN_FAILED if outputs.failed else 0)
         return RUN_FAILED if outputs.failed else 0
@@ -83,8 +83,17 @@ def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None
     with uninterrupted():
         server = opened(lambda: serve(port=port))
         stack.callback(end, server)
-    print(f"mjwrap run: open {server.address}", file=sys.stderr)
+    print(
+        f"mjwrap run: rerun serves its viewer for a browser on this machine at port {port}, and the run at port "
+        f"{port + 1}, until Ctrl-C\n{_open(server)}",
+        file=sys.stderr,
+    )
     return server
+
+
+def _open(server: Server) -> str:
+    """Return the line with the address, which comes last."""
+    return f"mjwrap run: open {server.address}"
 
 
 def advance(simulation: Simulation, outputs: Outputs, interrupt: Interrupt) -> WallTime:
