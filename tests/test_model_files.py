@@ -1,5 +1,6 @@
 """Files that are not models are named as what they are, and names that a model lacks with those that resemble them."""
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -74,6 +75,20 @@ def test_a_model_of_opensim_is_not_a_table(
     assert "arm.osim" in said(ran)[-1]
     with pytest.raises(mw.TableError, match=r"a model of OpenSim, not a table; tables end in \.sto"):
         mw.read_table(file)
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        ("arm.osim", "a model of OpenSim, which mjwrap does not read yet"),
+        ("arm.xml", "is a model, not a recording .* mjwrap run arm.xml --excitation pulses --record"),
+        ("mjwrap:elbow", "mjwrap run mjwrap:elbow"),
+    ],
+)
+def test_a_model_is_not_replayed(file: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    ran = run_here("replay", capsys, file)
+    assert ran.code == 2
+    assert re.search(told, said(ran)[-1])
 
 
 @pytest.mark.parametrize(
