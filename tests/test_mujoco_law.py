@@ -159,7 +159,7 @@ def test_taken_over_muscles_pull_as_native_ones() -> None:
         ({"prm": (*PRM[:6], 0.0, *PRM[7:])}, "vmax must be finite and positive"),
         ({"length_range": (0.3, 0.3)}, "length range must be increasing: optimal fibre length is zero"),
         ({"length_range": (0.3, math.nan)}, "length range must be increasing"),
-        ({"acc0": math.inf}, "acc0 must be finite"),
+        ({"acc0": math.inf}, "acc0 must be a finite number"),
         ({"gear": 0.0}, "gear must be finite and positive"),
         ({"gear": -1.0}, "gear must be finite and positive"),
         ({"force_range": (1.0, -1.0)}, "force range must be at most -1.0, not 1.0"),
