@@ -1,5 +1,6 @@
 """A wrong type in any public function is an error that names the argument and says what it must be."""
 
+# pyright: reportArgumentType=false
 import inspect
 import re
 from collections.abc import Callable, Iterator
