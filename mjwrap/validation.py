@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -142,8 +142,12 @@ def several(value: Any, count: int, name: str, error: type[MjwrapError]) -> tupl
 
 
 def sequence(value: Any, name: str, error: type[MjwrapError], wanted: str) -> None:
-    """Raise `error` unless a value is a list, a tuple or another sequence, but not text."""
-    good = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+    """Raise `error` unless a value is a list, a tuple, an array or another collection, but not text or a dict."""
+    good = (
+        isinstance(value, Collection)
+        and not isinstance(value, Mapping)
+        and not isinstance(value, str | bytes)
+    )
     require(good, name, wanted, value, error)
 
 

@@ -157,7 +157,9 @@ def length_ranges(
         for name, value in (("starts", starts), ("samples", samples))
     )
     validation.whole(seed, 0, "seed", ModelError)
+    names = None if names is None else list(names)
     for name in names or ():
+        validation.instance(name, str, "each of names", ModelError, "the name of a muscle")
         if name not in muscles.names:
             raise ModelError(
                 f"no muscle '{name}' with a geodesic path; muscles: {', '.join(muscles.names) or 'none'}"

@@ -37,7 +37,7 @@ def running_side_rule() -> int:
 
 def check_side_rule(rule: int | None) -> None:
     """Raise `ModelError` unless `rule` is one of `SIDE_RULES`, or None."""
-    if rule is not None and not (isinstance(rule, int) and rule in SIDE_RULES):
+    if rule is not None and not (isinstance(rule, int | np.integer) and rule in SIDE_RULES):
         raise ModelError(
             f"side_rule {described(rule)} does not exist; it is 3, 4, or None for the running MuJoCo's"
         )

@@ -106,6 +106,7 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
     if not isinstance(obstacles, list | tuple):
         wanted = "a list of Obstacle and ViaPoint, such as [mw.Obstacle(mw.Sphere(0.03))]"
         validation.sequence(obstacles, "obstacles", GeometryError, wanted)
+        validation.require(hasattr(obstacles, "__getitem__"), "obstacles", wanted, obstacles, GeometryError)
     for k, obstacle in enumerate(obstacles):
         if not isinstance(obstacle, Obstacle | ViaPoint):
             raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")
