@@ -27,6 +27,7 @@ import bootstrap
 import mjwrap as mw
 from mjwrap.cli.common import console
 from mjwrap.cli.main import COMMANDS, module_of
+from mjwrap.mjcf.named_models import own_models
 from mjwrap.video import offscreen
 
 LINES = [
@@ -121,6 +122,8 @@ def _exists(name: str, line: Line, made: set[str]) -> bool:
         import myo_sim
 
         return name.removeprefix("myo_sim:") in {*myo_sim.REGISTRY, *myo_sim._composed_models()}
+    if name.startswith("mjwrap:"):
+        return name.removeprefix("mjwrap:") in own_models() or (not line.typed and name == "mjwrap:NAME")
     if not line.typed and name in ("MODEL", "FILE"):
         return True
     brought = name in BROUGHT or bool(OPENSIM.fullmatch(name))

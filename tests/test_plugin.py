@@ -419,6 +419,6 @@ def test_a_saved_model_has_its_mode(tmp_path: Path) -> None:
     mujoco.mj_saveModel(model, str(file))
     for mode in (None, "wrench"):
         assert load(file, mode).nplugin == 1
-    for mode in ("transmission", "sideways"):
-        with pytest.raises(ModelError, match="was saved with mode 'wrench'"):
+    for mode, told in (("transmission", "was saved with mode 'wrench'"), ("sideways", "does not exist")):
+        with pytest.raises(ModelError, match=told):
             load(file, mode)

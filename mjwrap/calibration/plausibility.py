@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.calibration.fibers import mujoco_peak_force
 from mjwrap.calibration.ranges import LengthRange, length_ranges
 from mjwrap.calibration.report import Finding, Implausible, ParameterLimits, ParameterReport
@@ -82,6 +83,8 @@ def implausible(
     Raises:
         StateError: the rest pose is not possible.
     """
+    validation.optional(limits, ParameterLimits, "limits", ModelError, "ParameterLimits")
+    validation.optional(ranges, Mapping, "ranges", ModelError, "what length_ranges returns, by muscle")
     limits = limits or ParameterLimits()
     ranges = length_ranges(muscles) if ranges is None else ranges
     passive = _passive_tension(muscles, rest)
@@ -180,7 +183,7 @@ def _passive_tension(muscles: MuscleSystem, rest: ArrayLike | None) -> NDArray[n
     model = copy.copy(muscles.model)
     data = mujoco.MjData(model)
     if rest is not None:
-        given = np.asarray(rest, dtype=np.float64)
+        given = validation.numbers(rest, "rest", StateError)
         if given.shape != (model.nq,):
             raise StateError(f"the rest pose must have shape ({model.nq},), not {given.shape}")
         data.qpos[:] = given

@@ -1,6 +1,6 @@
 """Test a model: tangency, derivatives, forces, energy, jumps. Prints pass or fail, the worst error and its location.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 At random poses, without a previous path to start from, the command tests that paths are tangent to their surfaces, that
 the lengthening speed and the moment arms are the derivatives of the length, that the generalised force is -F dl/dq,
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class CheckSettings:
     """The settings of `mjwrap check`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the pose to sweep around, None for qpos0. poses: number of random poses,
+    model: a file or a model by name. keyframe: the pose to sweep around, None for qpos0. poses: number of random poses,
     drawn with seed; samples: number of poses along a sweep. side_rule: as for `MuscleSystem`. json: a file for the
     results, "-" for standard output, or None.
     """

@@ -33,7 +33,7 @@ Geodesic muscles for MuJoCo.
 commands:
 {commands}
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 Examples:
   mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --plot elbow.png

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import TableError
+from mjwrap.files.atomic import as_path
 from mjwrap.files.table import SUFFIXES, Table, check_names
 
 Row = tuple[int, list[str]]  # line number, cells
@@ -27,7 +29,10 @@ def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
     for columns called name[0] to name[k − 1]. Numbers are returned as in the file: `Table.in_degrees` tells whether
     rotations are in degrees. Raises `TableError`, which names file, line and column of the first error.
     """
-    name = os.fspath(path)
+    name = as_path(path, TableError)
+    validation.flag(finite, "finite", TableError)
+    if name.lower().endswith(".osim"):
+        raise TableError(f"'{name}' is a model of OpenSim, not a table; tables end in {', '.join(SUFFIXES)}")
     suffix = Path(name).suffix.lower()
     if suffix == ".npz":
         table = _read_npz(name)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import html
+from mjwrap import html, validation
 from mjwrap.errors import TableError
 
 Array = NDArray[np.float64]
@@ -38,12 +38,16 @@ class Table:
     source: str = ""
 
     def __post_init__(self) -> None:
+        validation.instance(self.source, str, "source", TableError, "the name of a file, as str")
+        validation.instance(self.metadata, Mapping, "metadata", TableError, "a dict of texts by key")
         where = f"'{self.source}': " if self.source else ""
-        time, values = np.asarray(self.time, dtype=np.float64), np.asarray(self.values, dtype=np.float64)
-        names = tuple(self.names)
+        time = validation.numbers(self.time, f"{where}time", TableError)
+        values = validation.numbers(self.values, f"{where}values", TableError)
+        names = _names(self.names, where)
         if time.ndim != 1 or values.shape != (len(time), len(names)):
             raise TableError(
-                f"{where}times of shape {time.shape} and {len(names)} names do not fit values of shape {values.shape}"
+                f"{where}time, names, values: times of shape {time.shape} and {len(names)} names do not fit "
+                f"values of shape {values.shape}"
             )
         check_names(names, where)
         late = np.flatnonzero(~(np.diff(time) > 0.0))
@@ -86,6 +90,14 @@ class Table:
     def in_degrees(self) -> bool:
         """Whether the header says that rotations are in degrees."""
         return self.metadata.get("inDegrees", "no").strip().lower() in ("yes", "true", "1")
+
+
+def _names(given: object, where: str) -> tuple[str, ...]:
+    """Return names of columns as a tuple; `TableError` if they are not a list of texts."""
+    names = None if isinstance(given, str | bytes) or not isinstance(given, Iterable) else tuple(given)
+    good = names is not None and all(isinstance(name, str) for name in names)
+    validation.require(good, f"{where}names", "a tuple of texts, one for each column", given, TableError)
+    return names or ()
 
 
 def check_names(names: Sequence[str], where: str = "") -> None:

@@ -6,7 +6,7 @@ contains "mjwrap", for what MuJoCo's schema cannot express. Reading does not cha
 
 from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, keeps_state
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
-from mjwrap.mjcf.loading import read_model, with_remedy
+from mjwrap.mjcf.loading import is_binary, read_model, read_spec, with_remedy
 from mjwrap.mjcf.muscle_text import insert_xml, muscle_xml
 from mjwrap.mjcf.names import act_names, dof_names, has_plugin, name_of, names, qpos_names
 from mjwrap.mjcf.reader import read_declarations
@@ -23,6 +23,7 @@ __all__ = [
     "dof_names",
     "has_plugin",
     "insert_xml",
+    "is_binary",
     "keeps_state",
     "muscle_xml",
     "name_of",
@@ -30,6 +31,7 @@ __all__ = [
     "qpos_names",
     "read_declarations",
     "read_model",
+    "read_spec",
     "set_laws",
     "tendon_stops",
     "with_remedy",

@@ -206,8 +206,7 @@ class PathSolution(Derivatives):
         (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
         is -tension l̇ ("Velocity and force" in docs/derivation.md).
         """
-        if not np.isfinite(tension):
-            raise GeometryError(f"tension must be finite [N], not {tension!r}")
+        validation.require(validation.is_finite(tension), "tension", "finite [N]", tension, GeometryError)
         by_row = np.zeros((len(self._node) + 2, 6))
         segments.add_wrenches(self._count, self._segments, float(tension), by_row)
         wrench = np.zeros((len(self.contacts) + 2, 6))

@@ -86,9 +86,10 @@ def solve_sweep(
         GeometryError: an array has a wrong shape or is not finite.
     """
     tol = validation.positive(tol, "tol", GeometryError)
-    n = len(obstacles)
+    validation.flag(warm, "warm", GeometryError)
     node, owner = pack(obstacles), owners(obstacles)
-    shape = np.shape(pos)
+    n = len(obstacles)
+    shape = validation.numbers(pos, "pos", GeometryError).shape
     if len(shape) != 3 or shape[1:] != (n, 3):
         raise GeometryError(f"pos must have shape (T, {n}, 3), not {shape}")
     poses = shape[0]

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.mjcf.marks import own_instances
 from mjwrap.plugin.blocks.table import find_block
@@ -76,6 +77,7 @@ def head_of(block: int) -> NDArray[np.int64]:
 
 def read(data: mujoco.MjData) -> Readout:
     """Return the plugin's last results for `data`: from `mj_forward`, or from the start of the last `mj_step`."""
+    validation.of_type(data, "MjData", "data", StateError)
     names: list[str] = []
     columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
     for instance in instances(data.model):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjwrap import html
+from mjwrap import html, validation
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
@@ -67,6 +67,12 @@ class Recorder(RunLog):
         flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
+        if not hasattr(model, "nbody") or hasattr(model, "worldbody"):
+            validation.of_type(model, "MjModel", "model", RecordingError)
+        if not all(hasattr(muscles, name) for name in ("n", "names", "declarations")):
+            validation.of_type(muscles, "MuscleSystem", "muscles", RecordingError)
+        where = "True, False or the address of a viewer"
+        require("connect", connect, isinstance(connect, bool | str), where)
         require("rate", rate, rate is None or is_positive(rate), "a positive number of states per second")
         require("path_rate", path_rate, is_positive(path_rate), "a positive number of frames per second")
         scaled = force_scale is None or is_positive(force_scale)

@@ -127,7 +127,7 @@ class PluginEngine:
 
 
 def start_engine(source: str, mode: str, strict: bool, side_rule: int | None = None) -> Engine:
-    """Return the engine of a model (a file, or "myo_sim:NAME") for a mode of `MODES`.
+    """Return the engine of a model (a file, "mjwrap:NAME" or "myo_sim:NAME") for a mode of `MODES`.
 
     "python" is `MuscleSystem`; the others are modes of the plugin's `install`. strict: raise `PathError` at the first
     step at which a muscle has no path. side_rule: as for `MuscleSystem` and `install`.

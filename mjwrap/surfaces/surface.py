@@ -108,7 +108,7 @@ def positive(surface: Surface, name: str, value: Any, unbounded: bool = False) -
 def axes(surface: Surface, name: str, value: Any, count: int) -> None:
     """Store `count` positive sizes as a tuple of floats; `GeometryError` for anything else."""
     try:
-        values = tuple(value)
+        values = () if isinstance(value, str | bytes) else tuple(value)
     except TypeError:
         values = ()
     if len(values) != count:

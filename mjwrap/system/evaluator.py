@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels.coupling import finite_checks, from_python
 from mjwrap.mjcf import has_plugin, read_declarations
@@ -29,9 +30,8 @@ class Evaluator(Results):
 
     def __init__(self, model: mujoco.MjModel, *, strict: bool = False, side_rule: int | None = None) -> None:
         if not isinstance(model, mujoco.MjModel):
-            raise ModelError(
-                f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
-            )
+            validation.of_type(model, "MjModel", "model", ModelError)
+        validation.flag(strict, "strict", ModelError)
         if has_plugin(model):
             raise ModelError(
                 "the engine plugin already drives the muscles of this model (install): mj_step moves it, and "
@@ -57,7 +57,7 @@ class Evaluator(Results):
 
     @excitation.setter
     def excitation(self, values: ArrayLike) -> None:
-        given = np.asarray(values, dtype=np.float64)
+        given = validation.numbers(values, "excitation", StateError)
         if given.shape != self._excitation.shape:
             wanted = self._excitation.shape
             raise StateError(f"excitation must have shape {wanted}, one for each muscle, not {given.shape}")
@@ -69,7 +69,7 @@ class Evaluator(Results):
                 "this MuscleSystem has released its actuators to MuJoCo; build a new MuscleSystem to go on"
             )
         if not isinstance(data, mujoco.MjData):
-            raise StateError(f"expected an MjData, not {type(data).__name__}")
+            validation.of_type(data, "MjData", "data", StateError)
         if data.model._address != self.model._address:
             raise StateError("this MjData belongs to a different model than this MuscleSystem")
         key = id(data)

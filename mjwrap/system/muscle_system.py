@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import from_python, wrenches
@@ -195,8 +196,8 @@ class MuscleSystem(Evaluator):
         Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds only the forces of other code.
         Raises `StateError` if the state is not finite, or if MuJoCo resets it because the motion became unstable.
         """
-        if nstep < 0:
-            raise StateError(f"nstep must not be negative, got {nstep}")
+        if not (isinstance(nstep, int | np.integer) and nstep >= 0):
+            raise StateError(f"nstep must be a whole number, not negative, got {validation.described(nstep)}")
         state = self._state(data)
         before = resets(data)
         runge_kutta = int(self.model.opt.integrator) == _RK4
@@ -293,7 +294,8 @@ class MuscleSystem(Evaluator):
     def set_branch(self, data: mujoco.MjData, branch: ArrayLike) -> None:
         """Restore what `branch` returned, also for another MjData of the model; else `StateError`."""
         state = self._state(data)
-        given, rows = np.asarray(branch, dtype=np.float64), state.node[:, layout.S_MODE :][:, : layout.STATE]
+        given = validation.numbers(branch, "branch", StateError)
+        rows = state.node[:, layout.S_MODE :][:, : layout.STATE]
         if given.shape != (rows.size + state.own.size,):
             raise StateError(
                 f"branch must have shape ({rows.size + state.own.size},) as branch() returns it, not {given.shape}"

@@ -166,8 +166,10 @@ class Results:
     def index(self, name: str) -> int:
         """Return the index of a muscle by name; `GeometryError`, which lists the names, if there is no such muscle."""
         names = self.names
+        if not isinstance(name, str):
+            raise GeometryError(f"no muscle of the name {validation.described(name)}; muscles: {listed(names)}")
         if name not in names:
-            near = difflib.get_close_matches(str(name), names, n=3)
+            near = difflib.get_close_matches(name, names, n=3)
             meant = f"did you mean {' or '.join(near)}? " if near else ""
             raise GeometryError(f"no muscle '{name}'; {meant}muscles: {listed(names)}")
         return names.index(name)
@@ -203,6 +205,7 @@ class Results:
 
     def reason(self, i: int) -> str:
         """Return why muscle i last had no path, naming the elements; empty if it always had one."""
+        i = self._known(i)
         code = int(self._evaluation().last_failure[i])
         detail = self._evaluation().details[i]
         return (Status(code).message + (f" ({detail})" if detail else "")) if code else ""
@@ -219,9 +222,10 @@ class Results:
         return "\n".join(lines)
 
     def _known(self, i: int) -> int:
-        if not 0 <= i < self.n:
+        if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
             raise GeometryError(
-                f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}"
+                f"i: muscle {validation.described(i)} does not exist; "
+                f"there are {self.n}: {', '.join(self.names) or 'none'}"
             )
         return int(i)
 

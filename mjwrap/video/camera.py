@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError
 
 MUSCLES = (
@@ -25,6 +26,8 @@ def find_camera(
     mujoco.mjv_defaultFreeCamera(model, found)
     if camera is None:
         return found
+    wanted = "a camera's name or id, a mujoco.MjvCamera, or None"
+    validation.instance(camera, str | int | np.integer, "camera", RecordingError, wanted)
     names = [model.camera(i).name for i in range(model.ncam)]
     number = names.index(camera) if isinstance(camera, str) and camera in names else camera
     if number == MUSCLES:

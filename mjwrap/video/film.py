@@ -7,7 +7,9 @@ import math
 import os
 
 import mujoco
+import numpy as np
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
@@ -66,12 +68,13 @@ class Video(RunLog):
         legend: bool | None = None,
         shadows: bool = False,
     ) -> None:
+        validation.of_type(model, "MjModel", "model", RecordingError)
+        validation.optional(option, mujoco.MjvOption, "option", RecordingError, "a mujoco.MjvOption")
         require("fps", fps, is_positive(fps), "a positive number of frames per second")
         require("speed", speed, is_positive(speed), "a positive number of simulated seconds per second")
         for name, pixels in (("width", width), ("height", height)):
-            require(
-                name, pixels, int(pixels) == pixels and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384"
-            )
+            good = isinstance(pixels, int | float | np.integer) and pixels == pixels // 1
+            require(name, pixels, good and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384")
         self._model, self._camera = model, find_camera(model, camera)
         self._option = option or mujoco.MjvOption()
         self._look = FilmLook(background, colors, surfaces, legend, int(width), int(height))

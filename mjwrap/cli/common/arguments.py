@@ -11,7 +11,7 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.common.recorded import LOCAL, RecordingSettings
 from mjwrap.errors import TableError
 
-MODEL_HELP = "MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package"
+MODEL_HELP = "MJCF or MJB file, mjwrap:NAME (comes with mjwrap), or myo_sim:NAME (myo-sim package)"
 INITIAL_POSE = "qpos0, the model's initial pose"
 RECORDING_DETAILS = (
     "rate",

@@ -1,6 +1,6 @@
 """Compare MuJoCo's built-in tendon wrapping with mjwrap's paths on the same model.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 Every joint is swept over its range, around the start pose and around further poses, and random poses are drawn. Each
 path is judged by its geometry: it must be straight or a geodesic on the surface, meet the surface tangentially, never

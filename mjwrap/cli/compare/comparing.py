@@ -49,7 +49,7 @@ class GivenTables:
 class CompareSettings:
     """The settings of `mjwrap compare`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the start pose, None for qpos0. side_rule: of mjwrap's paths, as for
+    model: a file or a model by name. keyframe: the start pose, None for qpos0. side_rule: of mjwrap's paths, as for
     `MuscleSystem`. muscles: patterns of names, None for all. samples: number of poses along a sweep, and of random
     poses. bases: number of further poses to sweep around. duration: of the simulation [s], 0 for none. excitation: as
     `Excitation` takes it. law: "mujoco" simulates both with MuJoCo's curves, "declared" mjwrap with the declared law.
@@ -93,7 +93,7 @@ def compare(settings: CompareSettings) -> int:
     report = Report(settings.json)
     given = read_tables(settings.given, model, muscles, start) if settings.given else None
     if plot is not None or page is not None:
-        need_matplotlib()
+        need_matplotlib("--plot" if plot is not None else "--report")
     panels = data_panels(model, settings.data, start.qpos, settings.side_rule, report.say)
     columns: list[TableColumn] = []
     tables = (

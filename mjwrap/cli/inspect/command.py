@@ -1,6 +1,6 @@
 """List the muscles of a model, with laws and wrapping surfaces, and report implausible parameters.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 The list also names the actuators that stay with MuJoCo, and why. To judge the parameters, the joints are moved over
 their ranges, all together, to find the lengths that every muscle takes along its geodesic path. docs/parameters.md

@@ -27,7 +27,7 @@ from mjwrap.text import counted
 class InspectSettings:
     """The settings of `mjwrap inspect`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the rest pose, None for qpos0. seed: of the random poses. side_rule: as
+    model: a file or a model by name. keyframe: the rest pose, None for qpos0. seed: of the random poses. side_rule: as
     for `MuscleSystem`. ranges: of joints by name, in place of the model's [rad, m]. quick: judge only the parameters
     and the rest pose. strict: exit code 1 if something is implausible. json: a file for the report as values, "-" for
     standard output, or None.

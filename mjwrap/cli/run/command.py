@@ -1,6 +1,6 @@
 """Simulate a model with its muscles along geodesic paths.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 Excitation is PATTERN for all muscles, NAME=PATTERN for the muscles and actuators whose names match (* and ? match any
 characters), or a table (.csv, .sto, .mot, .npz) with a column 'time' and a column for each muscle or actuator that it

@@ -16,6 +16,7 @@ from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
+from mjwrap.cli.run.ending import UNSAVED, ended, positions, undriven
 from mjwrap.cli.run.mistakes import warn
 from mjwrap.cli.run.run_files import OutputSettings, open_outputs
 from mjwrap.errors import ModelError
@@ -30,7 +31,7 @@ from mjwrap.text import counted
 class RunCommandSettings:
     """The settings of `mjwrap run`.
 
-    model: a file, or "myo_sim:NAME". serve_port: port on which the run is served to a browser, or None. json: a file
+    model: a file or a model by name. serve_port: port on which the run is served to a browser, or None. json: a file
     for the report as values, "-" for standard output, or None.
     """
 
@@ -76,7 +77,7 @@ def run(settings: RunCommandSettings) -> int:
             )
             return interrupt.asked.code
         if server:
-            told = "mjwrap run: the run is complete and still served; press Ctrl-C to stop"
+            told = f"mjwrap run: the run is complete and still served; press Ctrl-C to stop\n{_open(server)}"
             served = serve_until_stopped(server, lambda: print(told, file=sys.stderr))
             return served or (RUN_FAILED if outputs.failed else 0)
         return RUN_FAILED if outputs.failed else 0
@@ -89,8 +90,17 @@ def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None
     with uninterrupted():
         server = opened(lambda: serve(port=port))
         stack.callback(end, server)
-    print(f"mjwrap run: open {server.address}", file=sys.stderr)
+    print(
+        f"mjwrap run: rerun serves its viewer for a browser on this machine at port {port}, and the run at port "
+        f"{port + 1}, until Ctrl-C\n{_open(server)}",
+        file=sys.stderr,
+    )
     return server
+
+
+def _open(server: Server) -> str:
+    """Return the line with the address, which comes last."""
+    return f"mjwrap run: open {server.address}"
 
 
 def advance(simulation: Simulation, outputs: Outputs, interrupt: Interrupt) -> WallTime:
@@ -128,8 +138,14 @@ def tell(
         report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
+    report.say(ended(simulation))
+    if sentence := undriven(simulation):
+        report.say(sentence)
     for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
+    wanted = settings.outputs
+    if not (wanted.files or wanted.recording.wanted or settings.json or settings.serve_port):
+        report.say(UNSAVED)
 
 
 def facts(
@@ -147,6 +163,8 @@ def facts(
         "integrator": _integrator(engine.model),
         "timestep": float(engine.model.opt.timestep),
         "simulated": float(engine.data.time),
+        "positions": positions(simulation),
+        "undriven": undriven(simulation),
         "wall": spent.simulation,
         "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,
