@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -28,8 +29,9 @@ from mjwrap.plugin.spec.configuration import (
     configuration_texts,
     spec_instances,
 )
+from mjwrap.plugin.spec.force_sensors import hidden_forces, hidden_forces_message
 from mjwrap.plugin.spec.instance import add_instance, prevent_sleep
-from mjwrap.plugin.spec.tendons import hide_tendons, remove_unneeded_tendons, show_tendon
+from mjwrap.plugin.spec.tendons import hide_tendons, left_out_tendons, remove_unneeded_tendons, show_tendon
 from mjwrap.plugin.spec.undo import undone_on_error
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
@@ -101,6 +103,9 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: in
     model = _compile(spec)
     if not keep_tendons:
         remove_unneeded_tendons(model, declared)
+    hidden = hidden_forces(model, muscles, left_out_tendons(model))
+    if hidden:
+        warnings.warn(hidden_forces_message(hidden), stacklevel=4)
     return model
 
 

@@ -13,9 +13,10 @@ from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.mjcf import MuscleDeclaration, name_of
 from mjwrap.model.arrays import Plan
 from mjwrap.model.kinematic_tree import last_dofs, moving_dofs
+from mjwrap.plugin.blocks.length_sensors import length_sensors
 from mjwrap.plugin.callbacks import transmission as tr
 from mjwrap.plugin.mujoco_c.offsets import offsets
-from mjwrap.plugin.spec.tendon_uses import is_measured_late, shown_tendons
+from mjwrap.plugin.spec.tendon_uses import shown_tendons
 
 Ints = NDArray[np.int64]
 OBJ = mujoco.mjtObj
@@ -49,30 +50,6 @@ def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: list[Muscle
                 )
 
 
-def _sensors(model: mujoco.MjModel, plan: Plan, tendons: Ints) -> list[tuple[int, int, int, float]]:
-    """Return the sensors of lengths: index in sensordata, muscle, whether of an actuator, and cutoff [m]."""
-    kinds = mujoco.mjtSensor
-    by_output = {int(out): m for m, out in enumerate(plan.output) if out >= 0}
-    by_tendon = {int(tendon): m for m, tendon in enumerate(tendons) if tendon >= 0}
-    found: list[tuple[int, int, int, float]] = []
-    for i in range(model.nsensor):
-        kind, item = int(model.sensor_type[i]), int(model.sensor_objid[i])
-        if is_measured_late(model, i):
-            continue
-        muscle = None
-        if kind == int(kinds.mjSENS_ACTUATORPOS):
-            muscle = by_output.get(int(model.actuator_outadr[item]))
-        elif kind == int(kinds.mjSENS_TENDONPOS):
-            muscle = by_tendon.get(item)
-        if muscle is not None:
-            cutoff = float(model.sensor_cutoff[i])
-            limit = cutoff if cutoff > 0.0 else np.inf
-            found.append(
-                (int(model.sensor_adr[i]), muscle, int(kind == int(kinds.mjSENS_ACTUATORPOS)), limit)
-            )
-    return found
-
-
 def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> Ints:
     """Return the part of the block that `callbacks/transmission.py` reads, as 64-bit integers."""
     head = np.zeros(tr.HEAD, dtype=np.int64)
@@ -86,7 +63,10 @@ def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDec
         [t if out >= 0 and t in shown else -1 for t, out in zip(pulled, plan.output, strict=True)],
         dtype=np.int64,
     )
-    sensors = _sensors(model, plan, tendons)
+    by_output = {int(out): m for m, out in enumerate(plan.output) if out >= 0}
+    sensors = length_sensors(
+        model, by_output, {int(tendon): m for m, tendon in enumerate(tendons) if tendon >= 0}
+    )
     head[tr.DOFS], head[tr.OUTPUTS], head[tr.MOMENTS] = model.nv, model.nout, model.nJmom
     head[tr.TENDONS], head[tr.TENDON_MOMENTS] = model.ntendon, model.nJten
     head[tr.SENSORS], head[tr.SENSOR_NUMBERS] = len(sensors), model.nsensordata
