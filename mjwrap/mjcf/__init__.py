@@ -4,7 +4,8 @@ Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendo
 contains "mjwrap", for what MuJoCo's schema cannot express. Reading does not change the model.
 """
 
-from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, keeps_state
+from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, is_muscle, keeps_state
+from mjwrap.mjcf.bare_tendons import tendon_declarations
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.loading import read_model, with_remedy
 from mjwrap.mjcf.names import act_names, dof_names, has_plugin, name_of, names, qpos_names
@@ -21,6 +22,7 @@ __all__ = [
     "act_names",
     "dof_names",
     "has_plugin",
+    "is_muscle",
     "keeps_state",
     "name_of",
     "names",
@@ -28,6 +30,7 @@ __all__ = [
     "read_declarations",
     "read_model",
     "set_laws",
+    "tendon_declarations",
     "tendon_stops",
     "with_remedy",
 ]

@@ -28,7 +28,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
 COLUMN = 9  # the last column of gainprm, biasprm and dynprm
 PLUGIN_INSTANCE = "mjwrap"  # name of the plugin's instance, after the prefix of an attached model

@@ -12,11 +12,11 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model, with_remedy
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
+from mjwrap.model.moment_columns import check_moment_columns
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
 from mjwrap.plugin.blocks.instance_muscles import read_muscles
-from mjwrap.plugin.blocks.transmission_part import check_moment_columns
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error
 from mjwrap.plugin.spec.actuators import disable_actuators, enable_actuator

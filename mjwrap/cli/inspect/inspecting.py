@@ -11,13 +11,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem, implausible, length_ranges
+from mjwrap import implausible, length_ranges
 from mjwrap.calibration.joints import JointSpace
 from mjwrap.cli.common.errors import FAULTS, UserError
 from mjwrap.cli.common.output import Report
+from mjwrap.cli.inspect.cables import cable_rows, cable_table
 from mjwrap.cli.inspect.declared import as_values, table
 from mjwrap.runs.models import load, start_keyframe, start_state
-from mjwrap.text import counted
+from mjwrap.system import CableSystem, MuscleSystem, is_cable
+from mjwrap.text import counted_paths
 
 
 @dataclass(frozen=True)
@@ -49,14 +51,20 @@ def inspect(settings: InspectSettings) -> int:
         copy.copy(model), rest, joints
     )  # read first, so that a mistake in a range is reported before the work
     report = Report(settings.json)
-    muscles = MuscleSystem(model, side_rule=settings.side_rule)
+    muscles = CableSystem(model, side_rule=settings.side_rule)
     if not muscles.names and not muscles.native:
-        raise UserError("the model has no muscles: nothing to inspect")
+        raise UserError("the model has no muscles and no actuators on spatial tendons: nothing to inspect")
     report.say(
-        f"{settings.model}: {counted(muscles.n, 'muscle')} with geodesic paths, "
+        f"{settings.model}: {counted_paths(muscles.n, len(muscles.cables))} with geodesic paths, "
         f"{len(muscles.native)} with MuJoCo's own paths"
     )
-    report.say(table(model, muscles.declarations))
+    ranges = {} if settings.quick else length_ranges(muscles, ranges=joints, base=rest, seed=settings.seed)
+    own = [muscle for muscle in muscles.declarations if not is_cable(muscle)]
+    cables = cable_rows(model, muscles, rest, ranges)
+    if own:
+        report.say(table(model, own))
+    if cables:
+        report.say(cable_table(cables))
     for name, reason in muscles.native.items():
         report.say(f"{name}: stays with MuJoCo: {reason}")
     unmet = _unmet_hints(muscles, rest)
@@ -65,13 +73,13 @@ def inspect(settings: InspectSettings) -> int:
             f"{name}: in the rest pose it passes {', '.join(geoms)} on another side than the hint or side site asks "
             f"for, where no path was found"
         )
-    ranges = {} if settings.quick else length_ranges(muscles, ranges=joints, base=rest, seed=settings.seed)
     found = implausible(muscles, ranges=ranges, rest=rest)
     report.say(found.table())
     values: dict[str, Any] = {
         "model": settings.model,
         "side_rule": muscles.side_rule,
-        "muscles": [as_values(model, muscle) for muscle in muscles.declarations],
+        "muscles": [as_values(model, muscle) for muscle in own],
+        "cables": cables,
         "native": muscles.native,
         "unmet_hints": unmet,
     }

@@ -128,7 +128,9 @@ def block_image(
         head[bk.DRAW] = entries.draw.address
         head[bk.HEAD - len(bk.DRAWING) :] = sketch.words
     pieces, here = [], 8 * bk.HEAD
-    for place, array in enumerate(_arrays(model, plan, muscles, left_out, watched).values(), start=bk.A_ROUTES):
+    for place, array in enumerate(
+        _arrays(model, plan, muscles, left_out, watched).values(), start=bk.A_ROUTES
+    ):
         head[place] = here
         piece = np.ascontiguousarray(array).tobytes()
         pieces.append(piece + bytes(-len(piece) % 8))

@@ -80,9 +80,7 @@ def publish_lengths(part, block, model, data, first_stage, length, velocity):
     values = _field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
     for j in range(sensors):
         k = sensor[j, 1]
-        value = (
-            actuator_length[shown[k, S_OUTPUT]] if sensor[j, 2] != 0 else ten_length[shown[k, S_TENDON]]
-        )
+        value = actuator_length[shown[k, S_OUTPUT]] if sensor[j, 2] != 0 else ten_length[shown[k, S_TENDON]]
         values[sensor[j, 0]] = min(max(value, limits[j, 0]), limits[j, 1])
 
 

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 
 from mjwrap.mjcf import MuscleDeclaration
-from mjwrap.muscles.laws import ActuatorForce
 
 _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_ACTUATOR)
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
