@@ -49,7 +49,7 @@ def published_part(
         {row[pb.S_OUTPUT]: k for k, row in enumerate(rows) if row[pb.S_OUTPUT] >= 0},
         {row[pb.S_TENDON]: k for k, row in enumerate(rows) if row[pb.S_TENDON] >= 0},
     )
-    head[pb.OUTPUTS], head[pb.MOMENTS], head[pb.TENDONS] = model.nout, model.nJmom, model.ntendon
+    head[pb.OUTPUTS], head[pb.TENDONS] = model.nout, model.ntendon
     head[pb.SENSORS], head[pb.SENSOR_NUMBERS] = len(sensors), model.nsensordata
     head[pb.NO_SENSORS] = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
     fields = offsets().data | offsets().model

@@ -2,8 +2,8 @@
 
 MuJoCo computes lengths, then velocities, then passive forces, for which it calls the plugin, and then the forces of
 actuators. So `publish_lengths` runs with the passive forces, and `publish_forces` where MuJoCo asks plugins for the
-forces of actuators: after its own, before sensors read them. The moments of these actuators are set to zero there,
-because the wrenches pull already. The additional data are in a part of the instance's block with a head of its own,
+forces of actuators: after its own, before sensors read them. The moments of these actuators are made empty rows
+there, because the wrenches pull already; MuJoCo fills the rows again at every state. The additional data are in a part of the instance's block with a head of its own,
 which `mjwrap/plugin/blocks/published_part.py` writes.
 """
 
@@ -16,16 +16,14 @@ from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import float64_array, int32_array, int64_array, read_int32, read_int64
 
 # sizes; COUNT: number of muscles that are shown; if it is 0, the rest is not filled
-COUNT, OUTPUTS, MOMENTS, TENDONS, SENSORS, SENSOR_NUMBERS = range(6)
-NO_SENSORS = 6  # the bit of `disableflags` that switches sensors off
+COUNT, OUTPUTS, TENDONS, SENSORS, SENSOR_NUMBERS = range(5)
+NO_SENSORS = 5  # the bit of `disableflags` that switches sensors off
 # byte offsets of mjData's fields, then of mjModel's
 FIELDS = (
-    "actuator_length", "actuator_velocity", "actuator_force", "moment_rownnz", "moment_rowadr", "actuator_moment",
-    "ten_length", "ten_velocity", "sensordata", "actuator_gear",
+    "actuator_length", "actuator_velocity", "actuator_force", "moment_rownnz", "ten_length",
+    "ten_velocity", "sensordata", "actuator_gear",
 )  # fmt: skip
-(
-    LENGTH, VELOCITY, FORCE, ROWNNZ, ROWADR, MOMENT, TEN_LENGTH, TEN_VELOCITY, SENSORDATA, GEAR,
-) = range(7, 7 + len(FIELDS))  # fmt: skip
+LENGTH, VELOCITY, FORCE, ROWNNZ, TEN_LENGTH, TEN_VELOCITY, SENSORDATA, GEAR = range(6, 6 + len(FIELDS))
 # offsets of the arrays: `shown` (COUNT, SHOWN); sensors of the position stage (k, 3): index of the number, muscle, row
 # of `shown`, whether it is an actuator's; their smallest and largest values (k, 2)
 ARRAYS = ("shown", "sensor", "limits")
@@ -85,7 +83,7 @@ def publish_lengths(part, block, model, data, first_stage, length, velocity):
 
 
 def publish_forces(block, model, data):
-    """Write the forces of actuators whose muscles act by wrenches, and set their moments to zero.
+    """Write the forces of actuators whose muscles act by wrenches, and make their moments empty rows.
 
     The force times the gear is minus the tension, as for MuJoCo's own actuators.
     """
@@ -99,9 +97,7 @@ def publish_forces(block, model, data):
         block + read_int64(block + 8 * bk.A_TENSION), (read_int64(block + 8 * bk.MUSCLES),)
     )
     gear, force = _field(part, GEAR, model, (outputs, 6)), _field(part, FORCE, data, (outputs,))
-    moment = _field(part, MOMENT, data, (read_int64(part + 8 * MOMENTS),))
     rownnz = int32_array(read_int64(data + read_int64(part + 8 * ROWNNZ)), (outputs,))
-    rowadr = int32_array(read_int64(data + read_int64(part + 8 * ROWADR)), (outputs,))
     for k in range(count):
         out, value = shown[k, S_OUTPUT], 0.0
         if out < 0:
@@ -109,5 +105,4 @@ def publish_forces(block, model, data):
         if shown[k, S_FORCE] != 0 and gear[out, 0] != 0.0:
             value = -tension[shown[k, S_MUSCLE]] / gear[out, 0]
         force[out] = value if math.isfinite(value) and value != 0.0 else 0.0
-        for i in range(rowadr[out], rowadr[out] + rownnz[out]):
-            moment[i] = 0.0
+        rownnz[out] = 0
