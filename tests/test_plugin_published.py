@@ -1,4 +1,4 @@
-"""In wrench mode MuJoCo's own arrays and sensors show the muscles: lengths, velocities and tensions, without a force."""
+"""In wrench mode MuJoCo's own arrays and sensors show lengths, velocities and tensions, and nothing pulls twice."""
 
 from __future__ import annotations
 
