@@ -38,8 +38,8 @@ def check_model(
     """Check the paths, derivatives, forces, continuity and energy of a model's muscles.
 
     Actuators on spatial tendons that are not muscles are checked as strings that pull with a given force: what MuJoCo
-    makes of their controls is not mjwrap's. The limits are the same for every model, and relative to its own sizes: a model in millimetres passes like its twin
-    in metres.
+    makes of their controls is not mjwrap's. The limits are the same for every model, and relative to its own sizes: a
+    model in millimetres passes like its twin in metres.
 
     Args:
         model: the model; it is not changed.

@@ -23,9 +23,9 @@ def read_declarations(
     """Read every muscle that a model declares, in the order of its actuators, then of tuples without an actuator.
 
     transmission: MuJoCo computes the forces of its own muscles (`ActuatorForce`) and of all other actuators on spatial
-    tendons, which then count as muscles too. cables: this only for the actuators that are not muscles. side_rule: of the tendons' side sites, see `choose_side_rule`. Raises
-    `ModelError` for a wrong declaration. Native muscle actuators, or other actuators, that mjwrap cannot take over stay
-    with MuJoCo and are listed in `native`.
+    tendons, which then count as muscles too. cables: this only for the actuators that are not muscles.
+    side_rule: of the tendons' side sites, see `choose_side_rule`. Raises `ModelError` for a wrong declaration. Native
+    muscle actuators, or other actuators, that mjwrap cannot take over stay with MuJoCo and are listed in `native`.
     """
     if not hasattr(model, "nactuator"):
         raise VersionError(f"mjwrap needs MuJoCo 3.11 or newer, this is {mujoco.__version__}")

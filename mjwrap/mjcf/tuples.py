@@ -54,8 +54,8 @@ def read_tuple(
     """Return the muscle that a tuple declares; `ModelError`, which names the tuple or muscle and the element, if wrong.
 
     rest: kinematics of the reference pose. by_mujoco: whether MuJoCo computes the force under the law "mujoco": of its
-    muscles, and of other actuators on spatial tendons. side_rule: of the side sites of a tendon whose route the tuple takes; the hints that
-    the tuple itself lists are the author's, and nothing changes their meaning.
+    muscles, and of other actuators on spatial tendons. side_rule: of the side sites of a tendon whose route the tuple
+    takes; the hints that the tuple itself lists are the author's, and nothing changes their meaning.
     """
     tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
     try:

@@ -109,8 +109,9 @@ def compare(settings: CompareSettings) -> int:
         for name, summary in found.muscles.items()
     }
     cables, bare = (len(found.muscles.keys() & set(group)) for group in (muscles.cables, muscles.bare))
+    paths = counted_paths(len(found.muscles), cables, bare)
     report.say(
-        f"{settings.model}: {counted_paths(len(found.muscles), cables, bare)} at {counted(found.poses, 'pose')} each; MuJoCo "
+        f"{settings.model}: {paths} at {counted(found.poses, 'pose')} each; MuJoCo "
         f"{mujoco.__version__}, mjwrap with MuJoCo {found.side_rule}'s rule for side sites"
     )
     tell_poses(report.say, found, verdicts)

@@ -83,13 +83,14 @@ def cable_rows(
 
 def cable_table(rows: list[dict[str, Any]]) -> str:
     """Return a line for each cable."""
-    cells: list[tuple[str, ...]] = [_HEAD]
-    for row in rows:
-        cells.append((
+    cells = [
+        (
             row["name"], row["actuator"], row["tendon"], f"{row['gear']:g}", _range(row["control"]),
             _range(row["force"]), _number(1e3 * row["length"]), _range(row["length_range"], 1e3), row["path"],
-        ))  # fmt: skip
-    return "\n".join(aligned(cells, _WORDS))
+        )
+        for row in rows
+    ]  # fmt: skip
+    return "\n".join(aligned([_HEAD, *cells], _WORDS))
 
 
 def _number(value: float) -> str:

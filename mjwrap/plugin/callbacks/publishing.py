@@ -2,9 +2,9 @@
 
 MuJoCo computes lengths, then velocities, then passive forces, for which it calls the plugin, and then the forces of
 actuators. So `publish_lengths` runs with the passive forces, and `publish_forces` where MuJoCo asks plugins for the
-forces of actuators: after its own, before sensors read them. The moments of these actuators are made empty rows
-there, because the wrenches pull already; MuJoCo fills the rows again at every state. The additional data are in a part of the instance's block with a head of its own,
-which `mjwrap/plugin/blocks/published_part.py` writes.
+forces of actuators: after its own, before sensors read them. There the moments of these actuators become empty rows,
+because the wrenches pull already; MuJoCo fills the rows again at every state. The additional data are in a part of the
+instance's block with a head of its own, which `mjwrap/plugin/blocks/published_part.py` writes.
 """
 
 from __future__ import annotations
