@@ -17,6 +17,7 @@ from mjwrap.checking import check_model
 from mjwrap.cli.inspect.cables import kind
 from mjwrap.comparison import compare_motion, compare_poses
 from mjwrap.mjcf import read_declarations
+from mjwrap.plugin import native
 from mjwrap.runs import RunSettings, simulate
 from mjwrap.system import CableSystem
 
@@ -221,6 +222,13 @@ def test_what_stays_with_mujoco_is_named(tmp_path: Path, capsys: pytest.CaptureF
     ran = run_here("run", capsys, FINGER, "--mode", "wrench", "--duration", 0.01)
     assert ran.code == 2
     assert "pull along it in mode 'transmission'" in ran.err
+
+
+def test_an_installed_model_names_its_native_cables() -> None:
+    named = native(mw.install(mujoco.MjSpec.from_string(CABLES)))
+    assert list(named) == ["winch", "brake", "tackle", "leash"]
+    assert set(named.values()) == {"it is not a muscle; mode 'transmission' drives it along mjwrap's path"}
+    assert native(mw.install(mujoco.MjSpec.from_string(CABLES), mode="transmission")) == {}
 
 
 COMMANDS = {

@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--timestep", type=positive, metavar="S", help="time step (default: the model's)")
     add("--integrator", choices=INTEGRATORS, type=str.lower, help="integrator (default: the model's)")
     add("--mode", metavar="MODE", help="python: steps a MuscleSystem (default); wrench or "
-        "transmission: runs the engine plugin in this mode (default with --video: wrench, for cables transmission)")  # fmt: skip
+        "transmission: runs the engine plugin in this mode (--video: wrench, for cables transmission)")  # fmt: skip
     add(
         "--excitation",
         **several,
