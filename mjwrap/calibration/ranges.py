@@ -16,7 +16,7 @@ from mjwrap.calibration.ascent import Ascent, ascend
 from mjwrap.calibration.joints import JointSpace
 from mjwrap.errors import ModelError
 from mjwrap.paths import Status
-from mjwrap.system import MuscleSystem
+from mjwrap.system import MuscleSystem, twin_of
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -168,7 +168,7 @@ def length_ranges(
     chosen = [i for i, name in enumerate(muscles.names) if names is None or name in names]
     space = JointSpace(model, model.qpos0 if base is None else base, ranges or {})
     moved, held = space.moves(muscles.declarations)
-    lengths = _Lengths(MuscleSystem(model, side_rule=muscles.side_rule), space)
+    lengths = _Lengths(twin_of(muscles, model), space)
     searches = _starts(lengths, chosen, moved, starts, samples, np.random.default_rng(seed))
     _climb(lengths, searches)
     found = {}

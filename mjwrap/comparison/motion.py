@@ -14,7 +14,7 @@ from mjwrap.errors import MjwrapError
 from mjwrap.mjcf import dof_names, name_of
 from mjwrap.model.takeover import Takeover
 from mjwrap.runs.excitation import Excitation
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem, MuscleSystem
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -140,7 +140,7 @@ def compare_motion(
         Both motions and their difference.
     """
     native_model, driven_model = pristine(model), pristine(model)
-    muscles = MuscleSystem(driven_model, side_rule=side_rule)
+    muscles = CableSystem(driven_model, side_rule=side_rule)
     excitation = Excitation(muscles, entries, seed)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):

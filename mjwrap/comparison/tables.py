@@ -20,7 +20,7 @@ from mjwrap.comparison.paired_evaluation import Comparer
 from mjwrap.errors import TableError
 from mjwrap.files import Table
 from mjwrap.mjcf.couplings import CoupledJoints
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem, MuscleSystem
 
 Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def _compare(
     each: Callable[[TableColumn], object] | None,
 ) -> list[TableDifference]:  # fmt: skip
     dof = _dof(model, joint) if joint else -1
-    muscles = MuscleSystem(model, side_rule=side_rule)
+    muscles = CableSystem(model, side_rule=side_rule)
     known = [*muscles.names, *muscles.native]
     columns = {_muscle_of(name, joint): table[name] for name in table.names}
     if not set(columns) & set(known):

@@ -4,7 +4,8 @@ Two forms are read (docs/declaring.md): every muscle actuator on a spatial tendo
 contains "mjwrap", for what MuJoCo's schema cannot express. Reading does not change the model.
 """
 
-from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, keeps_state
+from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, is_muscle, keeps_state
+from mjwrap.mjcf.bare_tendons import tendon_declarations
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.loading import is_binary, read_model, read_spec, with_remedy
 from mjwrap.mjcf.muscle_text import insert_xml, muscle_xml
@@ -24,6 +25,7 @@ __all__ = [
     "has_plugin",
     "insert_xml",
     "is_binary",
+    "is_muscle",
     "keeps_state",
     "muscle_xml",
     "name_of",
@@ -33,6 +35,7 @@ __all__ = [
     "read_model",
     "read_spec",
     "set_laws",
+    "tendon_declarations",
     "tendon_stops",
     "with_remedy",
 ]

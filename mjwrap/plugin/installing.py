@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 
 import mujoco
 
@@ -20,11 +21,11 @@ from mjwrap.mjcf import (
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
+from mjwrap.model.moment_columns import check_moment_columns
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
 from mjwrap.plugin.blocks.instance_muscles import read_muscles
-from mjwrap.plugin.blocks.transmission_part import check_moment_columns
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error
 from mjwrap.plugin.spec.actuators import disable_actuators, enable_actuator
@@ -37,8 +38,9 @@ from mjwrap.plugin.spec.configuration import (
     configuration_texts,
     spec_instances,
 )
+from mjwrap.plugin.spec.force_sensors import hidden_forces, hidden_forces_message
 from mjwrap.plugin.spec.instance import add_instance, prevent_sleep
-from mjwrap.plugin.spec.tendons import hide_tendons, remove_unneeded_tendons, show_tendon
+from mjwrap.plugin.spec.tendons import hide_tendons, left_out_tendons, remove_unneeded_tendons, show_tendon
 from mjwrap.plugin.spec.undo import undone_on_error
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
@@ -107,6 +109,9 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: in
     model = _compile(spec)
     if not keep_tendons:
         remove_unneeded_tendons(model, declared)
+    hidden = hidden_forces(model, muscles, left_out_tendons(model))
+    if hidden:
+        warnings.warn(hidden_forces_message(hidden), stacklevel=4)
     return model
 
 

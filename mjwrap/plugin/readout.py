@@ -60,6 +60,11 @@ def instances(model: mujoco.MjModel) -> list[int]:
     return found
 
 
+def saved_modes(model: mujoco.MjModel) -> set[str]:
+    """Return the modes in which the plugin drives the muscles of an installed model."""
+    return {configuration_at(model._address, instance).mode for instance in instances(model)}
+
+
 def block_address(data: mujoco.MjData, instance: int) -> int:
     """Return the address of an instance's block."""
     address = find_block(data._address, instance)

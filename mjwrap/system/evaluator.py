@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from mjwrap import validation
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels.coupling import finite_checks, from_python
-from mjwrap.mjcf import has_plugin, read_declarations
+from mjwrap.mjcf import Declarations, has_plugin, read_declarations
 from mjwrap.model.arrays import build_plan
 from mjwrap.model.takeover import Takeover
+from mjwrap.muscles.laws import ActuatorForce
 from mjwrap.paths import Status
 from mjwrap.system.checks import check_state, ends_inside
 from mjwrap.system.results import Array, Results
@@ -40,15 +41,25 @@ class Evaluator(Results):
         self.strict = strict
         self._takeover = Takeover(model)
         with self._takeover.original_limits():
-            found = read_declarations(model, side_rule=side_rule)
+            found = self._declarations(model, side_rule)
         plan = build_plan(model, found.muscles)
         super().__init__(found, plan, model, State(model, plan))
-        self._takeover.disable([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
+        self._takeover.disable(
+            [
+                muscle.actuator
+                for muscle in found.muscles
+                if muscle.actuator >= 0 and not isinstance(muscle.parameters, ActuatorForce)
+            ]
+        )
         self._states: dict[int, State] = {}
         self._groups_off = 0
         self._off: NDArray[np.bool_] = np.zeros(plan.n, dtype=np.bool_)
         self._routes, self._muscles = plan.route_group(), plan.muscle_group(self._off)
         self._excitation: Array = np.zeros(self._plan.n)
+
+    def _declarations(self, model: mujoco.MjModel, side_rule: int | None) -> Declarations:
+        """Return the muscles to drive."""
+        return read_declarations(model, side_rule=side_rule)
 
     @property
     def excitation(self) -> Array:

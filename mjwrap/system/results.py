@@ -167,7 +167,9 @@ class Results:
         """Return the index of a muscle by name; `GeometryError`, which lists the names, if there is no such muscle."""
         names = self.names
         if not isinstance(name, str):
-            raise GeometryError(f"no muscle of the name {validation.described(name)}; muscles: {listed(names)}")
+            raise GeometryError(
+                f"no muscle of the name {validation.described(name)}; muscles: {listed(names)}"
+            )
         if name not in names:
             near = difflib.get_close_matches(name, names, n=3)
             meant = f"did you mean {' or '.join(near)}? " if near else ""

@@ -41,6 +41,13 @@ def add_side_rule(parser: Any) -> None:
     )
 
 
+def add_tendons(parser: Any, what: str) -> None:
+    """Add the option --tendons; what: the verb of the command."""
+    parser.add_argument(
+        "--tendons", action="store_true", help=f"{what} spatial tendons without an actuator, too"
+    )
+
+
 def positive(text: str) -> float:
     """Convert an argument to a finite number above zero."""
     value = _number(text)

@@ -20,7 +20,7 @@ import argparse
 import shlex
 from collections.abc import Sequence
 
-from mjwrap.cli.common.arguments import add_json, add_model, at_least, not_negative
+from mjwrap.cli.common.arguments import add_json, add_model, add_tendons, at_least, not_negative
 from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.compare.comparing import CompareSettings, GivenTables, compare
 
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="compare only these muscles (* and ? match any characters)",
     )
+    add_tendons(parser, "compare")
     add(
         "--samples",
         type=at_least(3),
@@ -134,6 +135,7 @@ def settings(options: argparse.Namespace) -> CompareSettings:
         json=options.json,
         check=options.check,
         command=shlex.join(["mjwrap", "compare", *options.given]),
+        tendons=options.tendons,
     )
 
 

@@ -33,7 +33,8 @@ from mjwrap.mjcf import dof_names
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.runs.state_tables import read_states
-from mjwrap.text import counted
+from mjwrap.system import CableSystem
+from mjwrap.text import counted, counted_paths
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class CompareSettings:
     `Excitation` takes it. law: "mujoco" simulates both with MuJoCo's curves, "declared" mjwrap with the declared law.
     data: tables over a joint's position, for the plot. plot, page, csv, json: files, or None; json may be "-" for
     standard output. csv_all: write every row to csv. check: exit code 1 if a path of mjwrap is wrong. command: the
-    command line of this comparison.
+    command line of this comparison. tendons: compare tendons without an actuator, too.
     """
 
     model: str
@@ -77,6 +78,7 @@ class CompareSettings:
     json: str | None
     check: bool
     command: str
+    tendons: bool = False
 
 
 def compare(settings: CompareSettings) -> int:
@@ -84,7 +86,7 @@ def compare(settings: CompareSettings) -> int:
     model = load(settings.model)
     key = start_keyframe(model, settings.keyframe)
     start = start_state(model, key)
-    muscles = MuscleSystem(model, side_rule=settings.side_rule)
+    muscles = CableSystem(model, side_rule=settings.side_rule, tendons=settings.tendons)
     names = choose(muscles, settings.muscles)
     Excitation(muscles, settings.excitation, settings.seed)  # a mistake here is reported early
     plot = open_output(settings.plot, "--plot", ".png", ".pdf", ".svg") if settings.plot else None
@@ -109,8 +111,10 @@ def compare(settings: CompareSettings) -> int:
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
         for name, summary in found.muscles.items()
     }
+    cables, bare = (len(found.muscles.keys() & set(group)) for group in (muscles.cables, muscles.bare))
+    paths = counted_paths(len(found.muscles), cables, bare)
     report.say(
-        f"{settings.model}: {counted(len(found.muscles), 'muscle')} at {counted(found.poses, 'pose')} each; MuJoCo "
+        f"{settings.model}: {paths} at {counted(found.poses, 'pose')} each; MuJoCo "
         f"{mujoco.__version__}, mjwrap with MuJoCo {found.side_rule}'s rule for side sites"
     )
     tell_poses(report.say, found, verdicts)
@@ -181,7 +185,7 @@ def compare_all(
         return compare_poses(
             model, names=names, samples=settings.samples, bases=settings.bases, seed=settings.seed,
             base=start.qpos, each=rows.add if rows is not None else None, side_rule=settings.side_rule,
-            progress=progress,
+            tendons=settings.tendons, progress=progress,
         )  # fmt: skip
 
 

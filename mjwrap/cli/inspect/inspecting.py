@@ -11,16 +11,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import MuscleSystem, implausible, length_ranges
+from mjwrap import implausible, length_ranges
 from mjwrap.calibration.joints import JointSpace
 from mjwrap.checking.mistakes import PossibleMistake, possible_mistakes
 from mjwrap.cli.common.errors import FAULTS, UserError
 from mjwrap.cli.common.output import Report
+from mjwrap.cli.inspect.cables import cable_rows, cable_table
 from mjwrap.cli.inspect.declared import as_values, table
 from mjwrap.cli.inspect.moment_arms import arms_table, moment_arms
 from mjwrap.runs.angles import check_range
 from mjwrap.runs.models import load, single_joints, start_keyframe, start_state
-from mjwrap.text import counted
+from mjwrap.system import CableSystem, MuscleSystem, is_cable
+from mjwrap.text import counted, counted_paths
 
 
 @dataclass(frozen=True)
@@ -55,27 +57,33 @@ def inspect(settings: InspectSettings) -> int:
         if name in (single := single_joints(model)):
             check_range(model, single[name], low, high)
     report = Report(settings.json)
-    muscles = MuscleSystem(model, side_rule=settings.side_rule)
+    muscles = CableSystem(model, side_rule=settings.side_rule)
     if not muscles.names and not muscles.native:
-        raise UserError("the model has no muscles: nothing to inspect")
+        raise UserError("the model has no muscles and no actuators on spatial tendons: nothing to inspect")
     report.say(
-        f"{settings.model}: {counted(muscles.n, 'muscle')} with geodesic paths, "
+        f"{settings.model}: {counted_paths(muscles.n, len(muscles.cables))} with geodesic paths, "
         f"{len(muscles.native)} with MuJoCo's own paths"
     )
-    report.say(table(model, muscles.declarations))
+    ranges = {} if settings.quick else length_ranges(muscles, ranges=joints, base=rest, seed=settings.seed)
+    own = [muscle for muscle in muscles.declarations if not is_cable(muscle)]
+    cables = cable_rows(model, muscles, rest, ranges)
+    if own:
+        report.say(table(model, own))
+    if cables:
+        report.say(cable_table(cables))
     for name, reason in muscles.native.items():
         report.say(f"{name}: stays with MuJoCo: {reason}")
     arms = moment_arms(muscles, rest)
     report.say(arms_table(model, arms))
     mistakes = possible_mistakes(muscles, rest=rest, sweep=not settings.quick)
     report.say(mistakes_table(mistakes))
-    ranges = {} if settings.quick else length_ranges(muscles, ranges=joints, base=rest, seed=settings.seed)
     found = implausible(muscles, ranges=ranges, rest=rest)
     report.say(found.table())
     values: dict[str, Any] = {
         "model": settings.model,
         "side_rule": muscles.side_rule,
-        "muscles": [as_values(model, muscle) for muscle in muscles.declarations],
+        "muscles": [as_values(model, muscle) for muscle in own],
+        "cables": cables,
         "native": muscles.native,
         "unmet_hints": _unmet_hints(muscles, rest),
         "moment_arms": arms,

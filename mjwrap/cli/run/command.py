@@ -41,7 +41,7 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.run.run_files import FilmSettings, OutputSettings
 from mjwrap.cli.run.running import RunCommandSettings, run
 from mjwrap.files import SUFFIXES
-from mjwrap.runs.engine import MODES
+from mjwrap.runs.engine import MODES, film_mode
 from mjwrap.runs.models import INTEGRATORS
 from mjwrap.runs.run_table import DEFAULT_KINDS, KINDS
 from mjwrap.runs.simulation import RunSettings
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--timestep", type=positive, metavar="S", help="time step (default: the model's)")
     add("--integrator", choices=INTEGRATORS, type=str.lower, help="integrator (default: the model's)")
     add("--mode", metavar="MODE", help="python: steps a MuscleSystem (default); wrench or "
-        "transmission: runs the engine plugin in this mode (default with --video: wrench)")  # fmt: skip
+        "transmission: runs the engine plugin in this mode (--video: wrench, for cables transmission)")  # fmt: skip
     add(
         "--excitation",
         **several,
@@ -136,7 +136,7 @@ def execute(options: argparse.Namespace) -> int:
 
 def settings(options: argparse.Namespace) -> RunCommandSettings:
     """Convert the arguments to settings; raises `UserError` if they contradict each other."""
-    mode = options.mode or ("wrench" if options.video else MODES[0])
+    mode = options.mode or (film_mode(options.model) if options.video else MODES[0])
     if options.video and mode == MODES[0]:
         raise UserError("--video needs the engine plugin: leave --mode out, or write --mode wrench")
     if mode not in MODES:

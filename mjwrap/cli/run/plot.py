@@ -15,6 +15,7 @@ from mjwrap.cli.common.figures import legend_label, save_figure
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import name_of
 from mjwrap.runs.plot_history import PlotHistory
+from mjwrap.system import CableSystem
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -119,7 +120,9 @@ def _muscle_panel(
     figure: Any, axis: Any, time: Array, panel: str, muscles: MuscleSystem, history: PlotHistory, many: bool
 ) -> None:
     values = history.column({"activation": 2, "length": 3, "tension": 4}[panel])
-    label = {"activation": "activation", "length": "length [mm]", "tension": "tension [N]"}[panel]
+    cables = len(muscles.cables) if isinstance(muscles, CableSystem) else 0
+    drive = "control" if cables == muscles.n else "activation, control of cables" if cables else "activation"
+    label = {"activation": drive, "length": "length [mm]", "tension": "tension [N]"}[panel]
     if panel == "length":
         values = 1e3 * values
     if not many:

@@ -24,7 +24,8 @@ from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
 from mjwrap.runs.engine import MODES
 from mjwrap.runs.simulation import RunSettings, Simulation, WallTime
-from mjwrap.text import counted
+from mjwrap.system import CableSystem
+from mjwrap.text import counted, counted_paths
 
 
 @dataclass(frozen=True)
@@ -121,9 +122,10 @@ def tell(
     """Print the settings, the speed and the problems of the run, and its files."""
     engine, muscles = simulation.engine, simulation.muscles
     simulated = engine.data.time
+    cables = len(muscles.cables) if isinstance(muscles, CableSystem) else 0
     mode = "" if settings.run.mode == MODES[0] else f", plugin mode {settings.run.mode}"
     step = f"{_integrator(engine.model)}, time step {1e3 * engine.model.opt.timestep:g} ms"
-    report.say(f"{settings.model}: {counted(muscles.n, 'muscle')}, {step}{mode}")
+    report.say(f"{settings.model}: {counted_paths(muscles.n, cables)}, {step}{mode}")
     wall = spent.simulation
     rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
