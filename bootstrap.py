@@ -27,7 +27,8 @@ DEMO_RECORDING = "out/elbow.rrd"
 DEMO_PLOT = "out/elbow.png"
 
 # The wheels of MuJoCo 3 and 4 share a folder but not their lists of files, so going from one to the other inside an
-# environment leaves a mixture of both. Each has its own. myo-sim, real models for tests and demo, needs mujoco<4.
+# environment leaves a mixture of both. Each has its own. The newest myo-sim, real models for tests and demo, needs
+# mujoco<4.
 FOLDERS = {3: ".venv", 4: ".venv-mujoco4"}
 DEMO_EXTRAS = {"demo", "myo"}
 TEST_EXTRAS = {3: {"demo", "dev", "myo", "test"}, 4: {"demo", "test"}}

@@ -13,6 +13,7 @@ from .calibration import implausible as implausible
 from .calibration import length_ranges as length_ranges
 from .calibration import set_length_ranges as set_length_ranges
 from .errors import GeometryError as GeometryError
+from .errors import MissingPackageError as MissingPackageError
 from .errors import MjwrapError as MjwrapError
 from .errors import ModelError as ModelError
 from .errors import PathError as PathError
@@ -33,6 +34,8 @@ from .fitting import fit_elliptic_cylinder as fit_elliptic_cylinder
 from .fitting import fit_sphere as fit_sphere
 from .fitting import fit_torus as fit_torus
 from .fitting import mesh_points as mesh_points
+from .mjcf import insert_xml as insert_xml
+from .mjcf import muscle_xml as muscle_xml
 from .mjcf import set_laws as set_laws
 from .muscles import ActivationDynamics as ActivationDynamics
 from .muscles import DeGrooteFregly2016 as DeGrooteFregly2016
@@ -55,6 +58,8 @@ from .paths import solve_sweep as solve_sweep
 from .plugin import install as install
 from .plugin import load as load
 from .plugin import register as register
+from .poses import JointCurves as JointCurves
+from .poses import curves as curves
 from .recording import Recorder as Recorder
 from .surfaces import Capsule as Capsule
 from .surfaces import Cone as Cone

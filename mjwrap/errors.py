@@ -54,3 +54,7 @@ class VersionError(MjwrapError, RuntimeError):
 
     In the second case `MuscleSystem` works without the plugin.
     """
+
+
+class MissingPackageError(MjwrapError, ImportError):
+    """A package that mjwrap needs for this is not installed; the message says which one, and how to install it."""

@@ -8,6 +8,15 @@ def counted(number: float, noun: str) -> str:
     return f"{number:.0f} {noun}{'s' * (number != 1)}"
 
 
+def counted_paths(total: int, cables: int, tendons: int = 0) -> str:
+    """Return the numbers of muscles, cables and bare tendons in words; total: of all of them."""
+    parts = {"muscle": total - cables - tendons, "cable": cables}
+    words = [counted(number, noun) for noun, number in parts.items() if number]
+    if tendons:
+        words.append(f"{counted(tendons, 'tendon')} without an actuator")
+    return " and ".join(words) or counted(0, "muscle")
+
+
 def aligned(rows: Iterable[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
     """Return rows of cells as lines of text with aligned columns, two spaces apart; the heads are a row, too.
 

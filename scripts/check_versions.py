@@ -43,7 +43,7 @@ def check(folder: Path, options: argparse.Namespace, arguments: list[str]) -> in
     """Make the environment in `folder`, say what is in it, and run pytest with `arguments`."""
     extras = (
         EXTRAS if int(options.mujoco.split(".")[0]) > 3 else [*EXTRAS, "myo"]
-    )  # myo-sim asks for mujoco<4
+    )  # the newest myo-sim asks for mujoco<4
     requirements = ["-e", f"{ROOT}[{','.join(extras)}]", f"mujoco=={options.mujoco}.*", *options.extra]
     python = str(folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python"))
     steps = [

@@ -141,6 +141,11 @@ def _place(rng: np.random.Generator, body: _Body, k: int, kind: str, last: bool)
 
 
 def random_model(seed: int, surfaces: tuple[str, ...] = SIMPLE) -> mujoco.MjModel:
+    """The compiled `random_xml`."""
+    return mujoco.MjModel.from_xml_string(random_xml(seed, surfaces))
+
+
+def random_xml(seed: int, surfaces: tuple[str, ...] = SIMPLE) -> str:
     """A model with three muscles over 3 to 7 elements each, one of them with via points; no gravity, no contacts."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(4, 8))
@@ -189,7 +194,7 @@ def random_model(seed: int, surfaces: tuple[str, ...] = SIMPLE) -> mujoco.MjMode
         tuples.append(f'<element objtype="numeric" objname="mjwrap_{name}_optimal_force"/></tuple>')
     body = bodies[0].xml(rng)
     newline = "\n"
-    return mujoco.MjModel.from_xml_string(
+    return (
         f'<mujoco model="random{seed}"><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/>'
         f"<worldbody>{newline}{body}{newline}</worldbody><custom>{newline.join(tuples)}</custom></mujoco>"
     )

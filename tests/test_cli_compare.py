@@ -175,9 +175,9 @@ def test_check_fails_where_mjwrap_is_wrong(
         ([ELBOW, "--samples", "many"], "--samples"),
         ([ELBOW, "--keyframe", "bent"], "'bent'; keyframes: extended"),
         ([ELBOW, "--duration", "-1"], "--duration"),
-        ([ELBOW, "--json", "{folder}/missing/j.json"], "there is no folder"),
+        ([ELBOW, "--json", "{text}/j.json"], "text.xml' is not a folder"),
         ([ELBOW, "--json", "{folder}/j.txt"], r"must end in \.json"),
-        ([ELBOW, "--csv", "{folder}/x.csv", "--plot", "{folder}/missing/p.png"], "missing"),
+        ([ELBOW, "--csv", "{folder}/out/x.csv", "--plot", "{text}/p.png"], "is not a folder"),
         (
             [ELBOW, "--samples", "3", "--csv", "{folder}/x.csv", "--excitation", "wiggle"],
             "'wiggle' is not a pattern",

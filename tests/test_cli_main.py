@@ -65,7 +65,7 @@ def test_help_fits_a_narrow_terminal(
 def test_a_wrong_command_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate"]) == 2
     assert capsys.readouterr().err.startswith(
-        "mjwrap: no command 'simulate'; commands: run, compare, inspect"
+        "mjwrap: no command 'simulate'; commands: run, plot, compare, inspect"
     )
     assert main(["--frob"]) == 2
     assert "no option '--frob'" in capsys.readouterr().err

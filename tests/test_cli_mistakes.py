@@ -42,11 +42,11 @@ from mjwrap import Table, write_table
         ([ELBOW, "--connect", "--serve"], "not allowed with"),
         ([ELBOW, "--prescribe", "elbow_flexion=step:1@1"], "cannot jump"),
         ([ELBOW, "--prescribe", "knee=sine:1,1"], "knee.*elbow_flexion"),
-        ([ELBOW, "--prescribe", "elbow_flexion=sine:1,1", "--qpos", "elbow_flexion=1"], "is prescribed"),
-        ([ELBOW, "--plot", "{folder}/missing/p.png"], "there is no folder.*missing"),
+        ([ELBOW, "--prescribe", "elbow_flexion=sine:1,1,1", "--qpos", "elbow_flexion=1"], "is prescribed"),
+        ([ELBOW, "--plot", "{text}/missing/p.png"], "text.xml' is not a folder"),
         ([ELBOW, "--plot", "{folder}/p.docx"], r"must end in \.png or \.pdf or \.svg"),
         ([ELBOW, "--csv", "{folder}/sub.csv"], "it is a folder"),
-        ([ELBOW, "--record", "{folder}/missing/r.rrd"], "no folder"),
+        ([ELBOW, "--record", "{text}/r.rrd"], "text.xml' is not a folder"),
         ([ELBOW, "--record", "{folder}/r.bin"], r"must end in \.rrd"),
         ([ELBOW, "--out", "{folder}/t.xlsx"], r"must end in \.sto or \.mot or \.csv or \.npz"),
         ([ELBOW, "--columns", "length"], "needs a table: add --out or --csv"),
@@ -67,7 +67,7 @@ from mjwrap import Table, write_table
             "mode 'sideways' does not exist; modes: python, wrench, transmission",
         ),
         ([ELBOW, "--excitation", "{text}.sto"], r"text\.xml\.sto'.*no such file"),
-        ([ELBOW, "--csv", "{folder}/c.csv", "--plot", "{folder}/missing/p.png"], "missing"),
+        ([ELBOW, "--csv", "{folder}/out/c.csv", "--plot", "{text}/p.png"], "is not a folder"),
     ],
 )
 def test_a_mistake_is_told_in_one_line_and_leaves_nothing(

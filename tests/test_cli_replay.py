@@ -89,7 +89,12 @@ def test_replay_serves_to_a_browser(model: mujoco.MjModel, tmp_path: Path) -> No
     command = [sys.executable, "-m", "mjwrap", "replay", str(tmp_path / "run.rrd"), "--serve"]
     with subprocess.Popen([*command, "--port", str(port)], stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
-        check_serving(server, server.stdout.readline().split()[-1], port)
+        started, stop, address = (server.stdout.readline() for _ in range(3))
+        assert f"a browser on this machine at port {port}, and the recording (" in started
+        assert f"at port {port + 1}" in started
+        assert "Ctrl-C" in stop
+        assert address.startswith(f"open http://127.0.0.1:{port}")  # the last line
+        check_serving(server, address.split()[-1], port)
 
 
 def check_serving(server: "subprocess.Popen[str]", address: str, port: int) -> None:
@@ -124,8 +129,11 @@ def test_a_run_is_served_to_a_browser(tmp_path: Path) -> None:
     ]
     with start("run", ELBOW, *options, "--groups", "flexors=BIC*,BRA", "--rate", 60) as run:
         assert run.stderr is not None
+        started = run.stderr.readline()
+        assert f"a browser on this machine at port {port}, and the run at port {port + 1}" in started
         (address,) = re.findall(r"open (http\S+)", run.stderr.readline())
         assert any("still served" in line for line in run.stderr)  # the run is over
+        assert run.stderr.readline() == f"mjwrap run: open {address}\n"
         check_serving(run, address, port)
     held = read_summary(tmp_path / "r.rrd")
     assert held.states == 7  # the 2 ms steps after every 60th of a second, and the first
@@ -145,7 +153,7 @@ def test_a_server_that_is_ended_leaves_nobody_behind(
     with subprocess.Popen([*command, "--port", str(port)], stdout=subprocess.PIPE, text=True) as server:
         try:
             assert server.stdout is not None
-            address = server.stdout.readline().split()[-1]
+            *_, address = (server.stdout.readline().split()[-1] for _ in range(3))
             until(lambda: answers(address), "the server answers")
             number = getattr(signal, name)
             server.send_signal(number)

@@ -7,16 +7,16 @@ import pytest
 from cli_runs import CASE2, ELBOW, run_here, said
 
 SHORT = ("--duration", 0.01)
+OUTSIDE = "mjwrap run: warning: 'elbow_flexion={}' lies outside the joint's range, 0 to 2.26893 rad"
 
 
 @pytest.mark.parametrize(
     ("value", "told"),
     [
-        ("90", ["mjwrap run: warning: 'elbow_flexion=90' lies outside the joint's range, 0 to 2.26893 rad"]),
-        (
-            "-0.1",
-            ["mjwrap run: warning: 'elbow_flexion=-0.1' lies outside the joint's range, 0 to 2.26893 rad"],
-        ),
+        ("3", [f"{OUTSIDE.format('3')}; if degrees are meant, write 3deg"]),
+        ("-0.1", [f"{OUTSIDE.format('-0.1')}; if degrees are meant, write -0.1deg"]),
+        ("-6deg", [OUTSIDE.format("-0.10472")]),
+        ("90deg", []),
         ("0", []),
         ("1.5", []),
     ],

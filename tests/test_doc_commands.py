@@ -27,6 +27,7 @@ import bootstrap
 import mjwrap as mw
 from mjwrap.cli.common import console
 from mjwrap.cli.main import COMMANDS, module_of
+from mjwrap.mjcf.named_models import own_models
 from mjwrap.video import offscreen
 
 LINES = [
@@ -34,7 +35,16 @@ LINES = [
     *(x for page in PAGES for x in doc_commands.of_page(page.name, page.read_text())),
 ]
 # What a reader brings, in examples about files of another program or of an earlier run.
-BROUGHT = {"arm.xml", "motion.mot", "ik.mot", "states.npz", "lengths.sto", "arms.sto", "controls.sto"}
+BROUGHT = {
+    "arm.xml",
+    "motion.mot",
+    "ik.mot",
+    "states.npz",
+    "lengths.sto",
+    "arms.sto",
+    "arms.csv",
+    "controls.sto",
+}
 OPENSIM = re.compile(r"arm_MuscleAnalysis_\w+\.sto")
 CHECKERS = {"mkdocs", "ruff", "pyright", "lint-imports"}
 SHORTER = {
@@ -85,7 +95,9 @@ def _mjwrap(words: list[str], line: Line, made: set[str]) -> str | None:
         options = _parser(words[0]).parse_args(words[1:])
     except SystemExit:
         return "the parser refuses it"
-    given = [getattr(options, name, None) for name in ("model", "file", "states", "lengths")]
+    named = [getattr(options, name, None) for name in ("model", "file", "states", "lengths")]
+    given = [name for each in named for name in (each if isinstance(each, list) else [each])]
+    given += [entry.rpartition("=")[2] for entry in getattr(options, "data", None) or []]
     given += [arm.partition("=")[2] for arm in getattr(options, "moment_arms", [])]
     given += [x for x in getattr(options, "excitation", []) if Path(x).suffix in mw.files.SUFFIXES]
     wrong = [name for name in given if name and not _exists(name, line, made)]
@@ -110,6 +122,8 @@ def _exists(name: str, line: Line, made: set[str]) -> bool:
         import myo_sim
 
         return name.removeprefix("myo_sim:") in {*myo_sim.REGISTRY, *myo_sim._composed_models()}
+    if name.startswith("mjwrap:"):
+        return name.removeprefix("mjwrap:") in own_models() or (not line.typed and name == "mjwrap:NAME")
     if not line.typed and name in ("MODEL", "FILE"):
         return True
     brought = name in BROUGHT or bool(OPENSIM.fullmatch(name))

@@ -19,6 +19,7 @@ import pytest
 from doc_commands import FENCE, PAGES, ROOT
 
 import mjwrap as mw
+from mjwrap.mjcf import read_declarations
 
 _NO_TEST = re.compile(r"<!-- no-test: *(?P<reason>[^\n]*?) *-->\s*\Z")
 
@@ -140,7 +141,9 @@ def test_xml_fences_compile_in_their_models() -> None:
         for fence in FENCE.finditer(page.read_text())
         if fence["language"] == "xml"
     }
-    assert set(found) == {"declaring.md", "muscles.md"}, "say here what another page's XML is a part of"
+    assert set(found) == {"cables.md", "declaring.md", "muscles.md"}, (
+        "say here what another page's XML is a part of"
+    )
     model = mujoco.MjModel.from_xml_string(_ANKLE.format(found["muscles.md"]))
     assert (model.na, model.actuator("soleus").dyntype.item()) == (2, mujoco.mjtDyn.mjDYN_USER)
     elbow = re.sub(
@@ -156,3 +159,9 @@ def test_xml_fences_compile_in_their_models() -> None:
         0.1138,
         0.098,
     )
+    finger = (ROOT / "models/finger/finger.xml").read_text()
+    custom = f"<custom>{found['cables.md']}</custom>"
+    spec = mujoco.MjSpec.from_string(re.sub(r"<custom>.*?</custom>", custom, finger, flags=re.DOTALL))
+    cables = read_declarations(spec.compile(), cables=True).muscles
+    (fdp,) = [cable for cable in cables if cable.name == "fdp"]
+    assert [type(surface) for surface in fdp.surfaces] == [mw.Torus]

@@ -118,8 +118,8 @@ def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> No
     assert path.read_bytes() == before
     with pytest.raises(mw.TableError, match="must end in"):
         mw.write_table(tmp_path / "t.xlsx", made_up())
-    with pytest.raises(mw.TableError, match="there is no folder"):
-        mw.write_table(tmp_path / "missing" / "t.csv", made_up())
+    with pytest.raises(mw.TableError, match="is not a folder"):
+        mw.write_table(path / "missing" / "t.csv", made_up())
 
 
 @pytest.mark.parametrize(

@@ -340,6 +340,9 @@ def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
     (tmp_path / "leg.mjb").touch()
     (tmp_path / "notes.txt").touch()
     text = refused(tmp_path / "amr.xml")
-    assert f"{tmp_path / 'amr.xml'} does not exist; models in {tmp_path}: arm.xml, leg.mjb" in text
+    assert (
+        f"{tmp_path / 'amr.xml'} does not exist (did you mean 'arm.xml'?); models in {tmp_path}: arm.xml"
+        in text
+    )
     assert f"{tmp_path} is a folder; models in {tmp_path}: arm.xml, leg.mjb" in refused(tmp_path)
     assert "does not exist, nor does the folder nowhere" in refused(Path("nowhere") / "arm.xml")

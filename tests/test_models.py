@@ -17,7 +17,7 @@ each_file = pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 
 def test_every_model_of_the_demo_is_there() -> None:
     expected = {"paper_case1", "paper_case2", "paper_two_cylinders", "elbow", "elbow_conservative", "five_surfaces",
-        "torus_threading"}  # fmt: skip
+        "finger", "torus_threading"}  # fmt: skip
     assert {path.stem for path in FILES} == expected
 
 

@@ -151,15 +151,15 @@ def test_taken_over_muscles_pull_as_native_ones() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"prm": PRM[:8]}, "prm must be nine numbers"),
-        ({"passive": PRM[:8]}, "passive prm must be nine numbers"),
+        ({"prm": PRM[:8]}, "prm must be 9 numbers"),
+        ({"passive": PRM[:8]}, "passive prm must be 9 numbers"),
         ({"passive": (1.05, 0.75, *PRM[2:])}, "passive range must be above 1.05, not 0.75"),
         *(({"prm": (*PRM[:k], math.nan, *PRM[k + 1 :])}, "must be finite, not nan") for k in range(9)),
         ({"prm": (1.05, 0.75, *PRM[2:])}, "range must be above 1.05, not 0.75"),
         ({"prm": (*PRM[:6], 0.0, *PRM[7:])}, "vmax must be finite and positive"),
         ({"length_range": (0.3, 0.3)}, "length range must be increasing: optimal fibre length is zero"),
         ({"length_range": (0.3, math.nan)}, "length range must be increasing"),
-        ({"acc0": math.inf}, "acc0 must be finite"),
+        ({"acc0": math.inf}, "acc0 must be a finite number"),
         ({"gear": 0.0}, "gear must be finite and positive"),
         ({"gear": -1.0}, "gear must be finite and positive"),
         ({"force_range": (1.0, -1.0)}, "force range must be at most -1.0, not 1.0"),

@@ -33,7 +33,7 @@ def model() -> mujoco.MjModel:
 @pytest.mark.parametrize(
     ("place", "message"),
     [
-        ("missing/run.rrd", "there is no folder .*missing.*exists as far as"),
+        ("file/missing/run.rrd", "file' is not a folder"),
         ("run.txt", r"must end in \.rrd.*run\.rrd"),
         ("folder.rrd", "is a folder"),
         ("file/run.rrd", "is not a folder"),

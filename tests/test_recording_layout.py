@@ -63,8 +63,8 @@ def test_the_layout_shows_the_model_and_every_muscle(
     assert kinds.count("3D") == 1
     pages = -(-count // 8)
     assert (
-        kinds.count("TimeSeries") == 8 * pages + 2
-    )  # six quantities, moment arms, iterations; the solver's two
+        kinds.count("TimeSeries") == 9 * pages + 2
+    )  # six quantities, moment arms, the angle, iterations with the names; the solver's two
 
 
 def test_the_layout_says_whose_curves_stand_together(model: mujoco.MjModel, tmp_path: Path) -> None:

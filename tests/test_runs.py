@@ -49,7 +49,7 @@ def test_a_simulation_gives_every_sample_and_stops_when_asked() -> None:
         (RunSettings(excitation=["wiggle"]), mw.SignalError, "'wiggle' is not a pattern"),
         (RunSettings(prescribed=["elbow_flexion"]), mw.SignalError, "^'elbow_flexion': write JOINT=PATTERN"),
         (
-            RunSettings(prescribed=["elbow_flexion=sine:1,1"], positions={"elbow_flexion": 1.0}),
+            RunSettings(prescribed=["elbow_flexion=sine:1,1,1"], positions={"elbow_flexion": 1.0}),
             mw.SignalError,
             "'elbow_flexion=1': this joint's position is prescribed",
         ),

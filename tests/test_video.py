@@ -188,7 +188,7 @@ def test_a_camera_on_the_muscles_sees_all_of_the_cord_and_no_room_around_it(tmp_
     ("name", "options", "message"),
     [
         ("run.avi", {}, r"must end in \.mp4 or \.gif.*run\.mp4"),
-        ("none/run.gif", {}, "there is no folder"),
+        ("none/run.gif", {"fps": 60.0}, "at most 50 frames"),
         ("run.gif", {"fps": 60.0}, "at most 50 frames a second, not 60"),
         ("run.gif", {"fps": 0.0}, "fps must be a positive number"),
         ("run.gif", {"speed": -1.0}, "speed must be a positive number"),

@@ -1,7 +1,7 @@
 """Make the pictures of docs/surfaces.md: every surface with a path over it, a recording, surfaces fitted to a bone.
 
     python docs/_figures/surfaces.py    # into docs/images, and out/strap.rrd; the bone needs the myo-sim package
-    rerun --screenshot-to docs/images/recording_surfaces.png --window-size 1400x900 out/strap.rrd
+    python docs/_figures/recordings.py out/strap.rrd docs/images/recording_surfaces.png
 
 Paths and surfaces come from mjwrap itself; sizes are in centimetres.
 """

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.muscles.laws import DeGrooteFregly2016, MuJoCoMuscle
 
@@ -81,18 +82,19 @@ def fit_fiber_and_slack(
     Raises:
         ModelError: lengths or range do not increase, or the fibre would be shorter than its height l_o sin α₀.
     """
+    for name, value in (("shortest", shortest), ("longest", longest)):
+        validation.require(validation.is_number(value), name, "a length [m]", value, ModelError)
     if not (math.isfinite(longest) and 0.0 < shortest < longest):
         raise ModelError(
             f"lengths must be finite, positive and increasing [m], not {shortest:g} and {longest:g}: does the muscle "
             "have a path, and does a joint that moves it have a range?"
         )
-    if not 0.0 <= pennation_angle < 0.5 * math.pi:
-        raise ModelError(f"pennation_angle must be in [0, pi/2) [rad], not {pennation_angle!r}")
-    if not 0.0 <= least_slack < 1.0:
-        raise ModelError(
-            f"least_slack must be a fraction of the shortest length, in [0, 1), not {least_slack!r}"
-        )
-    low, high = (float(x) for x in fiber_range)
+    validation.between(
+        pennation_angle, 0.0, 0.5 * math.pi, "pennation_angle", ModelError, "in [0, pi/2) [rad]"
+    )
+    share = "a fraction of the shortest length, in [0, 1)"
+    validation.between(least_slack, 0.0, 1.0, "least_slack", ModelError, share)
+    low, high = validation.several(fiber_range, 2, "fiber_range", ModelError)
     height = math.sin(pennation_angle)
     if not (math.isfinite(high) and height < low < high):
         raise ModelError(
@@ -167,6 +169,7 @@ def hill_from_mujoco(
     Raises:
         ModelError: a parameter is not possible.
     """
+    validation.instance(law, MuJoCoMuscle, "law", ModelError, "a MuJoCoMuscle")
     if law.prm[2] < 0.0 and not law.acc0 > 0.0:
         raise ModelError(f"force must be scale/acc0, but acc0 is {law.acc0!r}")
     short, long = law.length_range

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf import MuscleDeclaration, name_of, names
 from mjwrap.mjcf.couplings import CoupledJoints
@@ -32,7 +33,7 @@ class JointSpace:
         self, model: mujoco.MjModel, base: ArrayLike, ranges: Mapping[str, tuple[float, float]]
     ) -> None:
         self.model = model
-        self.base = np.array(base, dtype=np.float64)
+        self.base = validation.numbers(base, "base", ModelError).copy()
         if self.base.shape != (model.nq,) or not np.isfinite(self.base).all():
             raise StateError(
                 f"the base pose must be finite and have shape ({model.nq},), not {self.base.shape}"

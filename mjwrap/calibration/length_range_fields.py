@@ -6,8 +6,10 @@ from typing import Any
 
 import mujoco
 
+from mjwrap import validation
 from mjwrap.calibration.ranges import LengthRange, length_ranges
 from mjwrap.errors import ModelError
+from mjwrap.mjcf.side_rules import check_side_rule
 from mjwrap.system import MuscleSystem
 
 _PLACEHOLDER = (
@@ -36,8 +38,8 @@ def set_length_ranges(
         ModelError: mjwrap cannot take over a muscle without a range, it has no path at any pose, or its length does
             not change.
     """
-    if not isinstance(spec, mujoco.MjSpec):
-        raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
+    validation.of_type(spec, "MjSpec", "spec", ModelError)
+    check_side_rule(side_rule)
     missing = [
         element
         for element in spec.actuators

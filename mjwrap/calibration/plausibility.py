@@ -11,15 +11,16 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.calibration.fibers import mujoco_peak_force
 from mjwrap.calibration.ranges import LengthRange, length_ranges
 from mjwrap.calibration.report import Finding, Implausible, ParameterLimits, ParameterReport
 from mjwrap.errors import ModelError, StateError
 from mjwrap.kernels.musculotendon import tension as laws
-from mjwrap.mjcf import name_of
+from mjwrap.mjcf import is_muscle, name_of
 from mjwrap.mjcf.actuators import mujoco_law
 from mjwrap.muscles.laws import FiberLaw, Law, MuJoCoMuscle, parameter_row
-from mjwrap.system import MuscleSystem
+from mjwrap.system import MuscleSystem, is_cable, twin_of
 from mjwrap.text import counted
 
 Found = Iterator[tuple[Implausible, float, float, str]]
@@ -82,12 +83,16 @@ def implausible(
     Raises:
         StateError: the rest pose is not possible.
     """
+    validation.optional(limits, ParameterLimits, "limits", ModelError, "ParameterLimits")
+    validation.optional(ranges, Mapping, "ranges", ModelError, "what length_ranges returns, by muscle")
     limits = limits or ParameterLimits()
     ranges = length_ranges(muscles) if ranges is None else ranges
     passive = _passive_tension(muscles, rest)
     findings: list[Finding] = []
     remarks: dict[str, tuple[str, ...]] = {}
     for i, muscle in enumerate(muscles.declarations):
+        if is_cable(muscle):
+            continue  # MuJoCo computes its force
         unit, known = as_unit(muscle.parameters), ranges.get(muscle.name)
         found = list(_alone(unit, limits))
         if known is not None and np.isfinite([known.shortest, known.longest]).all():
@@ -180,11 +185,11 @@ def _passive_tension(muscles: MuscleSystem, rest: ArrayLike | None) -> NDArray[n
     model = copy.copy(muscles.model)
     data = mujoco.MjData(model)
     if rest is not None:
-        given = np.asarray(rest, dtype=np.float64)
+        given = validation.numbers(rest, "rest", StateError)
         if given.shape != (model.nq,):
             raise StateError(f"the rest pose must have shape ({model.nq},), not {given.shape}")
         data.qpos[:] = given
-    own = MuscleSystem(model, side_rule=muscles.side_rule)
+    own = twin_of(muscles, model)
     own.forward(data)
     tension = np.full(own.n, np.nan)
     for i in np.flatnonzero(own.status == 0):
@@ -199,7 +204,7 @@ def _native_laws(muscles: MuscleSystem) -> Iterator[tuple[str, MuJoCoMuscle | st
     model = muscles.model
     for actuator in range(model.nactuator):
         name = name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
-        if name in muscles.native:
+        if name in muscles.native and is_muscle(model, actuator):
             law: MuJoCoMuscle | str
             try:
                 law = mujoco_law(model, actuator)

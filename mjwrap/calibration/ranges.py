@@ -11,11 +11,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.calibration.ascent import Ascent, ascend
 from mjwrap.calibration.joints import JointSpace
 from mjwrap.errors import ModelError
 from mjwrap.paths import Status
-from mjwrap.system import MuscleSystem
+from mjwrap.system import MuscleSystem, twin_of
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -147,19 +148,27 @@ def length_ranges(
         ModelError: a name is unknown, a range is not possible, or `muscles` is not a MuscleSystem.
     """
     if not isinstance(muscles, MuscleSystem):
-        raise ModelError(f"expected a MuscleSystem (mw.MuscleSystem(model)), not {type(muscles).__name__}")
+        validation.of_type(muscles, "MuscleSystem", "muscles", ModelError)
+    if names is not None:
+        validation.sequence(names, "names", ModelError, "a list of names of muscles, or None")
+    validation.optional(ranges, Mapping, "ranges", ModelError, "a dict of (low, high) by joint")
+    starts, samples = (
+        validation.whole(value, 1, name, ModelError)
+        for name, value in (("starts", starts), ("samples", samples))
+    )
+    validation.whole(seed, 0, "seed", ModelError)
+    names = None if names is None else list(names)
     for name in names or ():
+        validation.instance(name, str, "each of names", ModelError, "the name of a muscle")
         if name not in muscles.names:
             raise ModelError(
                 f"no muscle '{name}' with a geodesic path; muscles: {', '.join(muscles.names) or 'none'}"
             )
-    if starts < 1 or samples < 1:
-        raise ModelError(f"starts and samples must be at least 1, not {starts} and {samples}")
     model = copy.copy(muscles.model)
     chosen = [i for i, name in enumerate(muscles.names) if names is None or name in names]
     space = JointSpace(model, model.qpos0 if base is None else base, ranges or {})
     moved, held = space.moves(muscles.declarations)
-    lengths = _Lengths(MuscleSystem(model, side_rule=muscles.side_rule), space)
+    lengths = _Lengths(twin_of(muscles, model), space)
     searches = _starts(lengths, chosen, moved, starts, samples, np.random.default_rng(seed))
     _climb(lengths, searches)
     found = {}

@@ -8,7 +8,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from mjwrap import validation
 from mjwrap.calibration.ranges import LengthRange
+from mjwrap.errors import ModelError
 from mjwrap.text import aligned, counted
 
 
@@ -37,6 +39,9 @@ class ParameterLimits:
         passive: largest tension without activation at rest, in maximum isometric forces.
         excess: largest excess of the path over the declared length range, as a share of the range.
         force: smallest and largest maximum isometric force [N].
+
+    Raises:
+        ModelError: a limit is not a number, or a pair of limits not two numbers.
     """
 
     fiber: tuple[float, float] = (0.4, 1.6)
@@ -44,6 +49,15 @@ class ParameterLimits:
     passive: float = 0.1
     excess: float = 0.02
     force: tuple[float, float] = (1.0, 2e4)
+
+    def __post_init__(self) -> None:
+        for name in ("fiber", "tendon", "force"):
+            validation.several(getattr(self, name), 2, f"ParameterLimits: {name}", ModelError)
+        for name in ("passive", "excess"):
+            number = validation.is_number(getattr(self, name))
+            validation.require(
+                number, f"ParameterLimits: {name}", "a number", getattr(self, name), ModelError
+            )
 
 
 @dataclass(frozen=True)

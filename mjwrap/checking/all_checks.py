@@ -17,7 +17,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf import dof_names
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.sizes import turning_dofs
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem, MuscleSystem
 
 Array = NDArray[np.float64]
 LEAST = 1e-3  # smallest moment arm to which errors are relative, as a share of the length; 1 along slides
@@ -32,12 +32,14 @@ def check_model(
     base: Array | None = None,
     seed: int = 0,
     side_rule: int | None = None,
+    tendons: bool = False,
     progress: Progress | None = None,
 ) -> Checks:
     """Check the paths, derivatives, forces, continuity and energy of a model's muscles.
 
-    The limits are the same for every model, and relative to its own sizes: a model in millimetres passes like its twin
-    in metres.
+    Actuators on spatial tendons that are not muscles are checked as strings that pull with a given force: what MuJoCo
+    makes of their controls is not mjwrap's. The limits are the same for every model, and relative to its own sizes: a
+    model in millimetres passes like its twin in metres.
 
     Args:
         model: the model; it is not changed.
@@ -47,6 +49,7 @@ def check_model(
         base: (nq,) base pose; qpos0 if None.
         seed: seed of the random poses.
         side_rule: as for `MuscleSystem`.
+        tendons: check spatial tendons without an actuator, too.
         progress: called with (name, number done, total number).
 
     Returns:
@@ -55,7 +58,8 @@ def check_model(
     Raises:
         ModelError: the model has no muscles.
     """
-    muscles, data = MuscleSystem(model, side_rule=side_rule), mujoco.MjData(model)
+    muscles = CableSystem(model, side_rule=side_rule, tendons=tendons, pulling=True)
+    data = mujoco.MjData(model)
     if not muscles.n:
         raise ModelError("the model has no muscles with geodesic paths: nothing to check")
     start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
@@ -94,10 +98,10 @@ def check_model(
         tell("sweeps", poses + k, total)
         sweeper.sweep(each, joint, axis, samples)
     tell("energy", total - 1, total)
-    energy = check_energy(model, maker.base, side_rule)
+    energy = check_energy(model, maker.base, side_rule, tendons)
     coupled = len(maker.joints()) - len(free)
     facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples,
-             "joints_that_follow": coupled}  # fmt: skip
+             "joints_that_follow": coupled, "cables": len(muscles.cables), "tendons": len(muscles.bare)}  # fmt: skip
     return Checks([*paths.finish(), speed, arms, *forces, jumps, energy], facts)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mjwrap.checking.outcome import Check
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf.couplings import read_couplings
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -45,7 +45,9 @@ def without_losses(model: mujoco.MjModel) -> mujoco.MjModel:
     return model
 
 
-def check_energy(model: mujoco.MjModel, qpos: Array, side_rule: int | None = None) -> Check:
+def check_energy(
+    model: mujoco.MjModel, qpos: Array, side_rule: int | None = None, tendons: bool = False
+) -> Check:
     """Compare the gain of energy with the muscles' work in a motion from rest at a pose (nq,).
 
     The remaining difference is the integrator's error, whose order is lower where a path lifts off. So the time step is
@@ -56,7 +58,7 @@ def check_energy(model: mujoco.MjModel, qpos: Array, side_rule: int | None = Non
     )
     for timestep in TIMESTEPS:
         try:
-            drift, exchanged = _drift(model, qpos, timestep, side_rule)
+            drift, exchanged = _drift(model, qpos, timestep, side_rule, tendons)
         except (ModelError, StateError) as error:
             check.skipped = str(error)
             return check
@@ -67,14 +69,16 @@ def check_energy(model: mujoco.MjModel, qpos: Array, side_rule: int | None = Non
     return check
 
 
-def _drift(model: mujoco.MjModel, qpos: Array, timestep: float, side_rule: int | None) -> tuple[float, float]:
+def _drift(
+    model: mujoco.MjModel, qpos: Array, timestep: float, side_rule: int | None, tendons: bool
+) -> tuple[float, float]:
     """Return the difference of energy and work relative to the exchanged energy, and this energy [J].
 
     Raises `ModelError` if the model allows no such motion.
     """
     model = without_losses(model)
     model.opt.timestep = timestep
-    muscles = MuscleSystem(model, side_rule=side_rule)
+    muscles = CableSystem(model, side_rule=side_rule, tendons=tendons, pulling=True)
     data, scratch = mujoco.MjData(model), mujoco.MjData(model)
     elastic = [m.name for m in muscles.declarations if m.parameters.states == 2]
     if elastic:

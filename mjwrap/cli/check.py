@@ -1,6 +1,6 @@
 """Test a model: tangency, derivatives, forces, energy, jumps. Prints pass or fail, the worst error and its location.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 At random poses, without a previous path to start from, the command tests that paths are tangent to their surfaces, that
 the lengthening speed and the moment arms are the derivatives of the length, that the generalised force is -F dl/dq,
@@ -22,12 +22,12 @@ import contextlib
 from dataclasses import dataclass
 
 from mjwrap.checking import check_model
-from mjwrap.cli.common.arguments import add_json, add_model, at_least
+from mjwrap.cli.common.arguments import add_json, add_model, add_tendons, at_least
 from mjwrap.cli.common.errors import FAULTS
 from mjwrap.cli.common.output import Report
 from mjwrap.cli.common.progress import Stages
 from mjwrap.runs.models import load, start_keyframe, start_state
-from mjwrap.text import counted
+from mjwrap.text import counted, counted_paths
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of poses along a sweep (default %(default)s)",
     )
+    add_tendons(parser, "test")
     add_json(parser, "write the results")
 
 
@@ -55,9 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class CheckSettings:
     """The settings of `mjwrap check`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the pose to sweep around, None for qpos0. poses: number of random poses,
+    model: a file or a model by name. keyframe: the pose to sweep around, None for qpos0. poses: number of random poses,
     drawn with seed; samples: number of poses along a sweep. side_rule: as for `MuscleSystem`. json: a file for the
-    results, "-" for standard output, or None.
+    results, "-" for standard output, or None. tendons: test tendons without an actuator, too.
     """
 
     model: str
@@ -67,6 +68,7 @@ class CheckSettings:
     seed: int
     side_rule: int | None
     json: str | None
+    tendons: bool = False
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -80,6 +82,7 @@ def execute(options: argparse.Namespace) -> int:
             seed=options.seed,
             side_rule=options.side_rule,
             json=options.json,
+            tendons=options.tendons,
         )
     )
 
@@ -97,6 +100,7 @@ def check(settings: CheckSettings) -> int:
             base=base,
             seed=settings.seed,
             side_rule=settings.side_rule,
+            tendons=settings.tendons,
             progress=progress,
         )
     facts = found.facts
@@ -104,7 +108,8 @@ def check(settings: CheckSettings) -> int:
     if coupled := facts["joints_that_follow"]:
         sweeps += f" ({counted(coupled, 'coupled joint')} moved along)"
     poses = f"{drawn} and {sweeps} of {counted(facts['poses_of_a_sweep'], 'pose')}"
-    report.say(f"{settings.model}: {counted(facts['muscles'], 'muscle')} at {poses}")
+    paths = counted_paths(facts["muscles"], facts["cables"], facts["tendons"])
+    report.say(f"{settings.model}: {paths} at {poses}")
     report.say(found.table())
     failed = len(found.failed)
     report.say(f"{failed} of {counted(len(found.checks), 'check')} failed" if failed else "no check failed")

@@ -16,8 +16,10 @@ from mjwrap.cli.common.output import note_inputs, say, written
 
 COMMANDS = {
     "run": "simulate a model with its muscles along geodesic paths",
+    "plot": "plot lengths, moment arms and forces over a joint, with tables of data over them",
     "compare": "compare MuJoCo's built-in tendons with mjwrap's paths on the same model",
     "inspect": "list the muscles of a model, what drives them, and which parameters are implausible",
+    "init": "write the declaration of a muscle along a route, to paste into a model",
     "check": "test the paths, moment arms, forces and energy of a model",
     "replay": "show a recording, or make one from a table of states",
     "warmup": "compile everything in advance, so that later commands start faster",
@@ -31,7 +33,7 @@ Geodesic muscles for MuJoCo.
 commands:
 {commands}
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 Examples:
   mjwrap run models/elbow/elbow.xml --duration 2 --excitation pulses --plot elbow.png

@@ -28,6 +28,7 @@ from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels.compilation import cache_folders
 from mjwrap.runs.models import load
+from mjwrap.system import CableSystem
 from mjwrap.text import counted
 
 SCENE = """
@@ -148,7 +149,7 @@ def muscles() -> None:
 
 def evaluate(model: mujoco.MjModel) -> None:
     """Evaluate, step, differentiate and draw the muscles of a model."""
-    system, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    system, data = CableSystem(model), mujoco.MjData(model)
     system.step(data)
     mujoco.mj_resetData(model, data)
     system.reset(data)

@@ -14,10 +14,11 @@ from mjwrap.errors import MjwrapError
 from mjwrap.mjcf import dof_names, name_of
 from mjwrap.model.takeover import Takeover
 from mjwrap.runs.excitation import Excitation
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem, MuscleSystem
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
+_HINGE, _SLIDE = (int(x) for x in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
 _UNSTABLE = (
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
     int(mujoco.mjtWarning.mjWARN_BADQVEL),
@@ -38,6 +39,8 @@ class MotionDifference:
         places: (nv,) index in qpos of each degree of freedom; for ball and free joints that of the joint's first.
         stopped: why a run ended early, or empty.
         paths: muscles without a path at some steps of mjwrap's run, the reason, and what acted instead; a line each.
+        turns: (nv,) whether each degree of freedom is an angle.
+        alone: (nv,) whether it is its joint's only one, so that `places` leads to its own position.
     """
 
     time: Array
@@ -48,6 +51,8 @@ class MotionDifference:
     places: list[int]
     stopped: str = ""
     paths: str = ""
+    turns: tuple[bool, ...] = ()
+    alone: tuple[bool, ...] = ()
 
     def worst(self) -> tuple[str, float, float]:
         """Return the dof that differs most, by how much [m or rad], and when [s]."""
@@ -62,6 +67,10 @@ class MotionDifference:
             return "", 0.0
         d = int(np.argmax(np.abs(self.difference[-1])))
         return self.dofs[d], float(self.difference[-1, d])
+
+    def unit(self, dof: str) -> str:
+        """Return the unit of a degree of freedom: rad or m."""
+        return "rad" if self.turns[self.dofs.index(dof)] else "m"
 
 
 def unstable(data: mujoco.MjData) -> bool:
@@ -131,7 +140,7 @@ def compare_motion(
         Both motions and their difference.
     """
     native_model, driven_model = pristine(model), pristine(model)
-    muscles = MuscleSystem(driven_model, side_rule=side_rule)
+    muscles = CableSystem(driven_model, side_rule=side_rule)
     excitation = Excitation(muscles, entries, seed)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):
@@ -161,7 +170,18 @@ def compare_motion(
     for row, a, b in zip(gap, theirs, ours, strict=True):
         mujoco.mj_differentiatePos(model, row, 1.0, a, b)
     runs = np.array(times), np.array(theirs), np.array(ours)
-    return MotionDifference(*runs, gap, dof_names(model), _places(model), stopped, _paths(muscles))
+    kinds = model.jnt_type[model.dof_jntid]
+    turns = [_turns(model, d, int(kind)) for d, kind in enumerate(kinds)]
+    alone = [int(kind) in (_HINGE, _SLIDE) for kind in kinds]
+    return MotionDifference(
+        *runs, gap, dof_names(model), _places(model), stopped, _paths(muscles), tuple(turns), tuple(alone)
+    )
+
+
+def _turns(model: mujoco.MjModel, dof: int, kind: int) -> bool:
+    """Return whether a degree of freedom of a kind of joint is an angle."""
+    axis = dof - int(model.jnt_dofadr[model.dof_jntid[dof]])
+    return kind != _SLIDE and (kind != int(mujoco.mjtJoint.mjJNT_FREE) or axis > 2)
 
 
 def _paths(muscles: MuscleSystem) -> str:

@@ -15,7 +15,7 @@ from mjwrap.comparison.paired_evaluation import Batch, Comparer
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.errors import ModelError
 from mjwrap.poses.joint_sweeps import PoseMaker
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem
 
 Array = NDArray[np.float64]
 
@@ -58,6 +58,7 @@ def compare_poses(
     base: Array | None = None,
     each: Callable[[Batch], object] | None = None,
     side_rule: int | None = None,
+    tendons: bool = False,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> PoseComparison:
     """Compare both programs along sweeps of every joint around the base pose, and at random poses.
@@ -71,6 +72,7 @@ def compare_poses(
         base: (nq,) base pose; qpos0 if None.
         each: called with every evaluated batch.
         side_rule: of mjwrap's paths, as for `MuscleSystem`; MuJoCo's tendons have that of the running MuJoCo.
+        tendons: compare spatial tendons without an actuator, too.
         progress: called with (name, done, all) before each motion.
 
     Returns:
@@ -80,7 +82,7 @@ def compare_poses(
         ModelError: a name is not that of a muscle.
     """
     model = pristine(model)
-    muscles = MuscleSystem(model, side_rule=side_rule)
+    muscles = CableSystem(model, side_rule=side_rule, tendons=tendons)
     known = [*muscles.names, *muscles.native]
     unknown = [name for name in names or () if name not in known]
     if unknown:

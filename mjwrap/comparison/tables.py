@@ -19,7 +19,8 @@ from mjwrap.comparison.motion import pristine
 from mjwrap.comparison.paired_evaluation import Comparer
 from mjwrap.errors import TableError
 from mjwrap.files import Table
-from mjwrap.system import MuscleSystem
+from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.system import CableSystem, MuscleSystem
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,7 @@ def compare_tables(
         qpos: (T, nq) the motion.
         lengths: a table of lengths [m].
         moment_arms: tables of moment arms [m] by the joint's name, positive where the muscle's tension increases the
-            coordinate.
+            coordinate. As in OpenSim, joints that follow the joint by an equality move with it.
         side_rule: of mjwrap's paths, as for `MuscleSystem`.
         each: called with the curves of every muscle in the tables.
 
@@ -117,7 +118,7 @@ def _compare(
     each: Callable[[TableColumn], object] | None,
 ) -> list[TableDifference]:  # fmt: skip
     dof = _dof(model, joint) if joint else -1
-    muscles = MuscleSystem(model, side_rule=side_rule)
+    muscles = CableSystem(model, side_rule=side_rule)
     known = [*muscles.names, *muscles.native]
     columns = {_muscle_of(name, joint): table[name] for name in table.names}
     if not set(columns) & set(known):
@@ -132,18 +133,19 @@ def _compare(
             f"{time[-1]:g} s"
         )
     poses = np.stack([np.interp(table.time, time, column) for column in qpos.T], axis=1)
-    comparer = Comparer(muscles, known)
+    comparer, couplings = Comparer(muscles, known), CoupledJoints(model)
     native = {name: t for name, t in _tendons(muscles).items() if name not in comparer.left_out}
     values = {("MuJoCo", name): np.full(len(poses), np.nan) for name in native}
     values |= {("mjwrap", name): np.full(len(poses), np.nan) for name in muscles.names}
     for k, pose in enumerate(poses):
         length, _, jacobian = comparer.native_at(pose, np.zeros(model.nv))
         own_length, _, own_jacobian, status = comparer.mjwrap_at(pose, np.zeros(model.nv))
+        along = _direction(couplings, pose, dof, model.nv) if dof >= 0 else None
         for name, tendon in native.items():
-            values["MuJoCo", name][k] = length[tendon] if dof < 0 else -jacobian[tendon, dof]
+            values["MuJoCo", name][k] = length[tendon] if along is None else -jacobian[tendon] @ along
         for i, name in enumerate(muscles.names):
             if status[i] == 0:
-                values["mjwrap", name][k] = own_length[i] if dof < 0 else -own_jacobian[i, dof]
+                values["mjwrap", name][k] = own_length[i] if along is None else -own_jacobian[i] @ along
     absent = np.full(len(poses), np.nan)
     for name in known:
         if name in columns and each is not None:
@@ -155,6 +157,12 @@ def _compare(
         if name in columns and np.isfinite(value - columns[name]).any()
     ]
     return sorted(told, key=lambda d: (known.index(d.muscle), d.program))
+
+
+def _direction(couplings: CoupledJoints, pose: Array, dof: int, nv: int) -> Array:
+    """Return dq (nv,) as a degree of freedom moves with all that follow it; alone if it follows another one."""
+    place = np.flatnonzero(couplings.independent == dof)
+    return couplings.matrix(pose)[:, place[0]] if place.size else np.eye(nv)[dof]
 
 
 def _difference(

@@ -106,7 +106,10 @@ class Extreme:
 
 @dataclass
 class Curves:
-    """One sweep of one muscle for a plot: at, and length and slope of both programs, (T,) each."""
+    """One sweep of one muscle for a plot: at, and length and slope of both programs, (T,) each.
+
+    turning: whether `at` is an angle.
+    """
 
     motion: str
     at: Array
@@ -116,6 +119,7 @@ class Curves:
     slope: Array | None
     failed: NDArray[np.bool_]
     base: int = 0
+    turning: bool = True
 
 
 @dataclass
@@ -225,7 +229,7 @@ class MuscleSummary:
         self.curves = Curves(
             motion.name, motion.at, pair.native.length, slope(pair.native, motion),
             None if mine is None else mine.length, None if mine is None else slope(mine, motion), pair.status != 0,
-            motion.base,
+            motion.base, motion.turning,
         )  # fmt: skip
 
     _score: tuple[float, float] = (0.0, 0.0)

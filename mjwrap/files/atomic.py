@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
 
-from mjwrap.errors import RecordingError
+from mjwrap.errors import MjwrapError, RecordingError
 from mjwrap.files.leftovers import part_name, remove_leftovers
 
 if TYPE_CHECKING:
@@ -21,20 +21,23 @@ if TYPE_CHECKING:
 # signals that ask a process to end: Ctrl-C, kill, and a closed terminal (not on Windows)
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
+_new_folders: set[Path] = set()  # made for files that are not complete yet
+
 
 class PartFile:
     """A temporary file beside `path`, created at once, so that a place that cannot be written is noticed before a run.
 
     `part` is the file to write; `publish` gives it the name `path` in one step, replacing an older file of that name;
     `discard` removes it. Until then an existing `path` is unchanged. Parts that killed processes have left in the
-    folder are removed first. option: the name of the option that gave the path, for messages.
+    folder are removed first. A missing folder is made, and removed again by `discard`. option: the name of the option
+    that gave the path, for messages.
 
-    Raises RecordingError if `path` has none of the suffixes, is not a regular file, may not be overwritten, or lies in
-    a folder that does not exist or cannot be written.
+    Raises RecordingError if `path` is not the name of a file, has none of the suffixes, is not a regular file, may not
+    be overwritten, or lies in a folder that cannot be made or written.
     """
 
     def __init__(self, path: str | os.PathLike[str], *suffixes: str, option: str = "") -> None:
-        self.path = Path(path)
+        self.path = Path(as_path(path))
         self._named = f"{option} '{self.path}'".lstrip()
         self._text: IO[str] | None = None
         if self.path.suffix.lower() not in suffixes:
@@ -49,9 +52,11 @@ class PartFile:
         try:
             fault = self._overwrite_fault()
             if not fault:
+                _make_folder(self.path.parent)
                 self.part.open("xb").close()
         except OSError as error:
             fault = _reason(error, self.path)
+            _remove_empty(self.path)
         if fault:
             raise RecordingError(f"cannot write {self._named}: {fault}")
 
@@ -96,6 +101,7 @@ class PartFile:
             with self.part.open("rb+") as file:
                 os.fsync(file.fileno())
             os.replace(self.part, self.path)
+        _new_folders.difference_update(self.path.absolute().parents)
 
     def discard(self) -> None:
         """Remove the temporary file, if it is still there."""
@@ -104,6 +110,7 @@ class PartFile:
                 self._text.close()
         with contextlib.suppress(OSError):
             self.part.unlink(missing_ok=True)
+        _remove_empty(self.path)
 
     def failure(self, error: Exception) -> RecordingError:
         """Return the error to raise if `error` ended the writing."""
@@ -217,6 +224,32 @@ def uninterrupted() -> Iterator[None]:
         previous[received[0]](*received)
 
 
+def as_path(path: object, error: type[MjwrapError] = RecordingError) -> str:
+    """Return the name of a file as text; `error` if it is neither text nor a path."""
+    text = os.fspath(path) if isinstance(path, str | os.PathLike) else None
+    if not isinstance(text, str):
+        raise error(f"path must be the name of a file, as str or Path, not {path!r}")
+    return text
+
+
+def _make_folder(folder: Path) -> None:
+    """Make a folder and those above it that are missing, and remember them until a file in them is complete."""
+    folder = folder.absolute()
+    for each in reversed([each for each in (folder, *folder.parents) if not each.exists()]):
+        with contextlib.suppress(FileExistsError):  # made by another process at this moment
+            each.mkdir()
+            _new_folders.add(each)
+
+
+def _remove_empty(path: Path) -> None:
+    """Remove the folders that were made for a file and others that never came, where nothing is in them."""
+    for folder in path.absolute().parents:
+        if folder in _new_folders:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+                _new_folders.discard(folder)
+
+
 def require(name: str, value: object, holds: "bool | np.bool_", wanted: str) -> None:
     """Raise RecordingError unless an argument is valid."""
     if not holds:
@@ -224,11 +257,12 @@ def require(name: str, value: object, holds: "bool | np.bool_", wanted: str) -> 
 
 
 def _reason(error: OSError, path: Path) -> str:
-    """Return the cause of an OSError as text; if a folder is missing, name the part of the path that exists."""
+    """Return the cause of an OSError as text; if a folder is missing, that it could not be made."""
     folder = path.absolute().parent
-    if isinstance(error, FileNotFoundError) and not folder.exists():
-        existing = next(parent for parent in folder.parents if parent.exists())
-        return f"there is no folder '{folder}' (the path exists as far as '{existing}')"
-    if isinstance(error, NotADirectoryError):
-        return f"'{folder}' is not a folder"
-    return (error.strerror or str(error)).lower()
+    reason = (error.strerror or str(error)).lower()
+    existing = next(parent for parent in (folder, *folder.parents) if parent.exists())
+    if not existing.is_dir():
+        return f"'{existing}' is not a folder"
+    if existing != folder:
+        return f"there is no folder '{folder}', and in '{existing}' none can be made: {reason}"
+    return reason

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import TableError
+from mjwrap.files.atomic import as_path
 from mjwrap.files.table import SUFFIXES, Table, check_names
 
 Row = tuple[int, list[str]]  # line number, cells
@@ -21,12 +23,16 @@ Row = tuple[int, list[str]]  # line number, cells
 def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
     """Read a table over time: OpenSim's .sto or .mot, .npz, else comma-separated values.
 
-    finite: refuse numbers that are not finite. A CSV file has a header with `time` [s] and names; an NPZ file has
+    finite: refuse numbers that are not finite. A CSV file has a header with `time` [s] and names, before which lines
+    such as `# inDegrees=yes` may stand; an NPZ file has
     `time` (T,), and either `columns` and `values`, as from `write_table`, or an array (T,) for each column, or (T, k)
     for columns called name[0] to name[k − 1]. Numbers are returned as in the file: `Table.in_degrees` tells whether
     rotations are in degrees. Raises `TableError`, which names file, line and column of the first error.
     """
-    name = os.fspath(path)
+    name = as_path(path, TableError)
+    validation.flag(finite, "finite", TableError)
+    if name.lower().endswith(".osim"):
+        raise TableError(f"'{name}' is a model of OpenSim, not a table; tables end in {', '.join(SUFFIXES)}")
     suffix = Path(name).suffix.lower()
     if suffix == ".npz":
         table = _read_npz(name)
@@ -34,11 +40,11 @@ def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
             k, column = (int(x[0]) for x in np.nonzero(~np.isfinite(table.values)))
             raise TableError(f"'{name}' row {k + 1}, column '{table.names[column]}': not finite")
         return table
-    text = _read_text(name)
+    text = read_text(name)
     return _read_opensim(name, text, finite) if suffix in (".sto", ".mot") else _read_csv(name, text, finite)
 
 
-def _read_text(name: str) -> str:
+def read_text(name: str) -> str:
     try:
         return Path(name).read_bytes().decode("utf-8-sig")
     except OSError as error:
@@ -53,9 +59,12 @@ def _read_csv(name: str, text: str, finite: bool) -> Table:
         rows = [row for row in numbered if any(cell.strip() for cell in row[1])]
     except csv.Error:
         raise TableError(f"'{name}' is not a text file with comma-separated values") from None
+    first = next((i for i, (_, cells) in enumerate(rows) if not cells[0].lstrip().startswith("#")), len(rows))
+    metadata = header_entries([",".join(cells).strip().lstrip("#") for _, cells in rows[:first]])
+    rows = rows[first:]
     if not rows:
         raise TableError(f"'{name}' is empty; wanted: a header with 'time' and names, then rows of numbers")
-    return _table(name, [cell.strip() for cell in rows[0][1]], rows[1:], {}, finite)
+    return _table(name, [cell.strip() for cell in rows[0][1]], rows[1:], metadata, finite)
 
 
 def _read_opensim(name: str, text: str, finite: bool) -> Table:
@@ -64,7 +73,7 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None:
         raise TableError(f"'{name}' has no line 'endheader', which must end the header of OpenSim's files")
-    metadata = _header(lines[:end])
+    metadata = header_entries(lines[:end])
     kind = metadata.get("DataType", "double")
     if kind.lower() != "double":
         raise TableError(f"'{name}' has {kind} in its cells; only DataType=double can be read")
@@ -83,7 +92,7 @@ def _read_opensim(name: str, text: str, finite: bool) -> Table:
     return table
 
 
-def _header(lines: list[str]) -> dict[str, str]:
+def header_entries(lines: list[str]) -> dict[str, str]:
     """Return the entries of a header: "key=value", SIMM's "key value", and the first line as the name."""
     found: dict[str, str] = {}
     for line in lines:

@@ -9,6 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError, TableError
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.table import SUFFIXES, Array, Table, check_names
@@ -22,6 +23,7 @@ def write_table(path: str | os.PathLike[str], table: Table) -> None:
     Numbers are written in full precision. CSV has no metadata. Raises `TableError` if the file cannot be written, or if
     a name is not possible in such a file.
     """
+    validation.instance(table, Table, "table", TableError, "a Table (mw.Table, mw.read_table)")
     output: PartFile | None = None
     try:
         output = PartFile(path, *SUFFIXES)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError, ModelError
 
 Array = NDArray[np.float64]
@@ -33,6 +34,12 @@ def mesh_points(model: Any, geom: str | int, region: Region | None = None, data:
     Raises:
         ModelError: the geom does not exist or is not a mesh. The message lists the mesh geoms.
     """
+    validation.of_type(model, "MjModel", "model", ModelError)
+    if data is not None:
+        validation.of_type(data, "MjData", "data", ModelError)
+    validation.instance(geom, str | int | np.integer, "geom", ModelError, "the name or id of a mesh geom")
+    good = region is None or (callable(region) and not isinstance(region, type))
+    validation.require(good, "region", "a function of points (m, 3), such as in_box", region, GeometryError)
     index = _mesh_geom(model, geom)
     mesh = int(model.geom_dataid[index])
     first = int(model.mesh_vertadr[mesh])

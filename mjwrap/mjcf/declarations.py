@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from mjwrap import html
 from mjwrap.muscles.activation import ActivationDynamics
 from mjwrap.muscles.laws import Law
 from mjwrap.surfaces import Surface
@@ -26,6 +27,12 @@ class Node:
     sizes: int = -1
     turn: float = field(default=0.0, compare=False)
 
+    def __repr__(self) -> str:
+        if self.surface is None:
+            return f"Node(site {self.site})"
+        hint = f", hint site {self.hint_site}" if self.hint_site >= 0 else ""
+        return f"Node(geom {self.geom}: {self.surface!r}{hint}{', held inside' * self.inside})"
+
 
 @dataclass(frozen=True)
 class Route:
@@ -35,6 +42,11 @@ class Route:
     nodes: tuple[Node, ...]
     insertion: int
     weight: float = 1.0
+
+    def __repr__(self) -> str:
+        stops = [f"site {self.origin}", *(repr(n)[5:-1] for n in self.nodes), f"site {self.insertion}"]
+        factor = f", weight {self.weight:g}" if self.weight != 1.0 else ""
+        return f"Route({' > '.join(stops)}{factor})"
 
     def geom_ends(self) -> list[tuple[Node, int, int]]:
         """Return every node on a geom with the sites before and after it."""
@@ -64,6 +76,26 @@ class MuscleDeclaration:
     actuator: int = -1
     tendon: int = -1
     activation: ActivationDynamics = field(default_factory=ActivationDynamics)
+
+    def __repr__(self) -> str:
+        driven = f", actuator {self.actuator}" if self.actuator >= 0 else ""
+        routes = ", ".join(map(repr, self.routes))
+        return f"MuscleDeclaration({self.name!r}, law {self.law}{driven}, {routes})"
+
+    def _repr_html_(self) -> str:
+        """Return the declaration as a notebook shows it; `muscles["NAME"]` shows it with the model's names."""
+        return html.facts(
+            [
+                ("name", self.name),
+                ("parameters", self.parameters),
+                (
+                    "actuator, tendon",
+                    ", ".join(str(i) if i >= 0 else "none" for i in (self.actuator, self.tendon)),
+                ),
+                *(("route", route) for route in self.routes),
+            ],
+            "MuscleDeclaration (numbers are MuJoCo's ids)",
+        )
 
     @property
     def law(self) -> str:

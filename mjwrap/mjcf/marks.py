@@ -6,7 +6,8 @@ another one. So mjwrap stores what it must know afterwards in entries that MuJoC
 - `actuator_gainprm[i, 9]` and `actuator_biasprm[i, 9]`: the lowest and highest force that actuator i had before it was
   disabled (∓mjMAXVAL: no limits). Written by `model/takeover.py` into a model and by `plugin/spec/actuators.py` into a
   spec; read by both, `plugin/blocks/image.py` and `plugin/callbacks/sync.py`.
-- `actuator_forcerange[i]`, 0 to 0 in a model and 0 to 1e-12 in a spec: actuator i is disabled. Same modules.
+- `actuator_forcerange[i]`: actuator i is disabled; 0 to 0 where a `MuscleSystem` runs, and `DISABLED_RANGE` with the
+  engine plugin, which shows tensions as forces and takes the moment away. Same modules.
 - `actuator_dynprm[i, 9]`, 1: gain and bias of actuator i were a muscle's. Used by `plugin/spec/tendons.py`.
 - `wrap_prm[tendon_adr[t]]`, if `tendon_num[t]` is 0: the number of stops that tendon t had. Same module.
 - `tendon_width[t]` below 1e-7 m: hidden; the original width is 2²⁶ times that. Written by `plugin/spec/tendons.py`,
@@ -27,15 +28,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
 COLUMN = 9  # the last column of gainprm, biasprm and dynprm
 PLUGIN_INSTANCE = "mjwrap"  # name of the plugin's instance, after the prefix of an attached model
 SIDE_RULE_PLACE = 3  # place of the side rule among the texts of an instance's configuration
 IDLE = ord("!")  # first character of the configuration of an idle instance: quoted names do not contain it
-# force range [N] of a disabled actuator in an MjSpec: the compiler rejects 0 to 0, to_xml writes nothing smaller,
-# and a muscle's force is never positive, so that it becomes zero
-DISABLED_RANGE = (0.0, 1e-12)
+# force range [N] of an actuator whose muscle the engine plugin runs: it limits nothing, and no model has it by chance
+DISABLED_RANGE = (-mujoco.mjMAXVAL, 0.5 * mujoco.mjMAXVAL)
+EARLIER_RANGE = (0.0, 1e-12)  # the same in models that were saved when the plugin showed no forces
 HIDDEN_FACTOR = (
     2.0**-26
 )  # factor on a tendon's width: a power of two, so that the original width is restored exactly
@@ -105,7 +105,7 @@ def disable_element(element: mujoco.MjsActuator, limits: ForceLimits) -> None:
 
 def enable_element(element: mujoco.MjsActuator) -> None:
     """Enable an actuator of an MjSpec, as `enable_force` does in a model; does nothing if it is not disabled."""
-    if not np.array_equal(element.forcerange, DISABLED_RANGE):
+    if tuple(element.forcerange) not in (DISABLED_RANGE, EARLIER_RANGE):
         return
     low, high = float(element.gainprm[COLUMN]), float(element.biasprm[COLUMN])
     limited = high < mujoco.mjMAXVAL
@@ -115,8 +115,14 @@ def enable_element(element: mujoco.MjsActuator) -> None:
 
 def zero_disabled_ranges(model: mujoco.MjModel) -> None:
     """Set the force ranges of actuators that were disabled in an MjSpec to 0 to 0, as in a model."""
-    disabled = (model.actuator_forcerange == DISABLED_RANGE).all(axis=1)
-    model.actuator_forcerange[disabled] = 0.0
+    for actuator in range(len(model.actuator_forcerange)):
+        if has_disabled_range(model, actuator):
+            model.actuator_forcerange[actuator] = 0.0
+
+
+def has_disabled_range(model: mujoco.MjModel, actuator: int) -> bool:
+    """Return whether an actuator was disabled in an MjSpec."""
+    return tuple(model.actuator_forcerange[actuator]) in (DISABLED_RANGE, EARLIER_RANGE)
 
 
 # ------------------------------------------------------------------------------------ the curves of muscle actuators

@@ -121,7 +121,8 @@ def build_law(
         return ActuatorForce()
     if actuator < 0 or not is_muscle(model, actuator):
         raise ModelError(
-            f"law 'mujoco' needs a muscle actuator in the tuple; laws without an actuator: {_without('mujoco')}"
+            f"law 'mujoco' needs a muscle actuator in the tuple; laws without an actuator: {_without('mujoco')}; "
+            f"other actuators of MuJoCo's pull along it in mode 'transmission'"
         )
     reason = curves_reason(model, actuator)
     if reason is not None:

@@ -18,28 +18,31 @@ OBJ = mujoco.mjtObj
 
 
 def read_declarations(
-    model: mujoco.MjModel, *, transmission: bool = False, side_rule: int | None = None
+    model: mujoco.MjModel, *, transmission: bool = False, cables: bool = False, side_rule: int | None = None
 ) -> Declarations:
     """Read every muscle that a model declares, in the order of its actuators, then of tuples without an actuator.
 
     transmission: MuJoCo computes the forces of its own muscles (`ActuatorForce`) and of all other actuators on spatial
-    tendons, which then count as muscles too. side_rule: of the tendons' side sites, see `choose_side_rule`. Raises
-    `ModelError` for a wrong declaration. Native muscle actuators, or other actuators, that mjwrap cannot take over stay
-    with MuJoCo and are listed in `native`.
+    tendons, which then count as muscles too. cables: this only for the actuators that are not muscles.
+    side_rule: of the tendons' side sites, see `choose_side_rule`. Raises `ModelError` for a wrong declaration. Native
+    muscle actuators, or other actuators, that mjwrap cannot take over stay with MuJoCo and are listed in `native`.
     """
     if not hasattr(model, "nactuator"):
         raise VersionError(f"mjwrap needs MuJoCo 3.11 or newer, this is {mujoco.__version__}")
     rest, rule = reference_pose(model), choose_side_rule(model, side_rule)
-    by_actuator, free = _read_tuples(model, rest, transmission, rule)
+    by_actuator, free = _read_tuples(model, rest, (transmission, transmission or cables), rule)
     muscles: list[MuscleDeclaration] = []
     native: dict[str, str] = {}
     for actuator in range(model.nactuator):
         if actuator in by_actuator:
             muscles.append(by_actuator[actuator])
-        elif is_muscle(model, actuator) or (transmission and pulled_tendon(model, actuator) >= 0):
-            reason = (path_reason if transmission else native_reason)(model, rest, actuator)
+            continue
+        muscle = is_muscle(model, actuator)
+        by_mujoco = transmission or (cables and not muscle)
+        if muscle or (by_mujoco and pulled_tendon(model, actuator) >= 0):
+            reason = (path_reason if by_mujoco else native_reason)(model, rest, actuator)
             if reason is None:
-                muscles.append(_read_native(model, rest, actuator, transmission, rule))
+                muscles.append(_read_native(model, rest, actuator, by_mujoco, rule))
             else:
                 native[name_of(model, OBJ.mjOBJ_ACTUATOR, actuator)] = reason
     for muscle, reason in _mostly_inside(model, [m for m in muscles if m.actuator not in by_actuator]):
@@ -57,9 +60,12 @@ def read_declarations(
 
 
 def _read_tuples(
-    model: mujoco.MjModel, rest: mujoco.MjData, transmission: bool, side_rule: int
+    model: mujoco.MjModel, rest: mujoco.MjData, by_mujoco: tuple[bool, bool], side_rule: int
 ) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
-    """Return the muscles of all mjwrap tuples: by actuator, and those without one."""
+    """Return the muscles of all mjwrap tuples: by actuator, and those without one.
+
+    by_mujoco: whether MuJoCo computes the forces of its muscles, and of other actuators.
+    """
     by_actuator: dict[int, MuscleDeclaration] = {}
     named_by: dict[int, str] = {}
     free: list[MuscleDeclaration] = []
@@ -67,7 +73,7 @@ def _read_tuples(
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
         if "mjwrap" not in tuple_name:
             continue
-        muscle = read_tuple(model, rest, index, transmission, side_rule)
+        muscle = read_tuple(model, rest, index, by_mujoco, side_rule)
         if muscle.actuator < 0:
             free.append(muscle)
         elif muscle.actuator in by_actuator:

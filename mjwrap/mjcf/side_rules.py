@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.marks import stored_side_rule
+from mjwrap.validation import described
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -36,8 +37,10 @@ def running_side_rule() -> int:
 
 def check_side_rule(rule: int | None) -> None:
     """Raise `ModelError` unless `rule` is one of `SIDE_RULES`, or None."""
-    if rule is not None and rule not in SIDE_RULES:
-        raise ModelError(f"side_rule {rule!r} does not exist; it is 3, 4, or None for the running MuJoCo's")
+    if rule is not None and not (isinstance(rule, int | np.integer) and rule in SIDE_RULES):
+        raise ModelError(
+            f"side_rule {described(rule)} does not exist; it is 3, 4, or None for the running MuJoCo's"
+        )
 
 
 def choose_side_rule(model: mujoco.MjModel, rule: int | None) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.actuators import is_fixed, pulled_tendon, unfit_reason
+from mjwrap.mjcf.actuators import is_fixed, is_muscle, pulled_tendon, unfit_reason
 from mjwrap.mjcf.declarations import MuscleDeclaration
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.parameters import (
@@ -48,14 +48,14 @@ def read_tuple(
     model: mujoco.MjModel,
     rest: mujoco.MjData,
     index: int,
-    transmission: bool = False,
+    by_mujoco: tuple[bool, bool] = (False, False),
     side_rule: int = AUTHORS,
 ) -> MuscleDeclaration:
     """Return the muscle that a tuple declares; `ModelError`, which names the tuple or muscle and the element, if wrong.
 
-    rest: kinematics of the reference pose. transmission: under the law "mujoco" MuJoCo computes the force, of any
-    actuator on a spatial tendon. side_rule: of the side sites of a tendon whose route the tuple takes; the hints that
-    the tuple itself lists are the author's, and nothing changes their meaning.
+    rest: kinematics of the reference pose. by_mujoco: whether MuJoCo computes the force under the law "mujoco": of its
+    muscles, and of other actuators on spatial tendons. side_rule: of the side sites of a tendon whose route the tuple
+    takes; the hints that the tuple itself lists are the author's, and nothing changes their meaning.
     """
     tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
     try:
@@ -82,7 +82,7 @@ def read_tuple(
         given = read_numerics(model, found.numerics)
         texts = read_texts(model, found.texts)
         law = texts.get(LAW) or choose_law(given)
-        native = transmission and law == "mujoco"
+        native = law == "mujoco" and by_mujoco[actuator < 0 or not is_muscle(model, actuator)]
         unfit = unfit_reason(model, actuator) if actuator >= 0 and not native else None
         if unfit is not None:
             raise ModelError(f"its actuator cannot be taken over: {unfit}")

@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed
 from mjwrap.mjcf.parameters import (
@@ -47,6 +48,9 @@ def set_laws(
         ModelError: no muscle has the name, an actuator pulls no tendon or pushes, or a law has no fibre. The spec is
             not changed then.
     """
+    validation.of_type(spec, "MjSpec", "spec", ModelError)
+    validation.instance(laws, Mapping, "laws", ModelError, "a dict of laws by the name of the muscle")
+    validation.optional(dynamics, ActivationDynamics, "dynamics", ModelError, "an ActivationDynamics")
     actuators = {actuator.name: actuator for actuator in spec.actuators}
     tuples = {entry.name: entry for entry in spec.tuples if "mjwrap" in entry.name}
     by_actuator = {_actuator_of(entry): entry for entry in tuples.values()}

@@ -35,9 +35,9 @@ class ActivationDynamics:
     smoothing: float = 10.0
 
     def __post_init__(self) -> None:
-        if self.dynamics not in FORMS:
+        if not isinstance(self.dynamics, str) or self.dynamics not in FORMS:
             raise ModelError(
-                f"activation dynamics '{self.dynamics}' do not exist; there are: {', '.join(FORMS)}"
+                f"activation dynamics {validation.described(self.dynamics)} do not exist; there are: {', '.join(FORMS)}"
             )
         values = {
             "activation_time": self.activation_time,
@@ -45,7 +45,7 @@ class ActivationDynamics:
             "smoothing": self.smoothing,
         }
         for name, value in values.items():
-            if value is not None:
+            if value is not None or name == "smoothing":
                 validation.positive(value, name, ModelError)
 
     @property

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels.musculotendon import dynamics as kernels
 from mjwrap.muscles.activation import ActivationDynamics
@@ -73,7 +74,11 @@ def simulate_muscle(
     Raises:
         StateError: an array has a wrong shape, or a number is not finite or not in its range.
     """
-    t = np.array(time, dtype=np.float64)
+    validation.require(
+        hasattr(law, "row") and not isinstance(law, type), "law", "a muscle's law", law, StateError
+    )
+    validation.optional(dynamics, ActivationDynamics, "dynamics", StateError, "an ActivationDynamics")
+    t = validation.numbers(time, "time", StateError).copy()
     if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
         raise StateError("time must be a list of finite, increasing numbers [s]")
     if (excitation is None) == (activation is None):
@@ -81,10 +86,10 @@ def simulate_muscle(
     lengths = _column("length", length, t.size)
     if not (lengths > 0.0).all():
         raise StateError("length must be positive [m]")
-    if not 0.0 <= initial_activation <= 1.0:
-        raise StateError(f"initial_activation must be in [0, 1], not {initial_activation!r}")
-    if initial_fiber_length is not None and not (0.0 < initial_fiber_length < math.inf):
-        raise StateError(f"initial_fiber_length must be positive [m], not {initial_fiber_length!r}")
+    most = math.nextafter(1.0, 2.0)
+    validation.between(initial_activation, 0.0, most, "initial_activation", StateError, "in [0, 1]")
+    if initial_fiber_length is not None:
+        validation.positive(initial_fiber_length, "initial_fiber_length", StateError, "m")
     drive = _column(
         "excitation" if activation is None else "activation", _either(excitation, activation), t.size
     )
@@ -108,7 +113,7 @@ def _either(first: ArrayLike | None, second: ArrayLike | None) -> ArrayLike:
 
 def _column(name: str, values: ArrayLike, size: int) -> Array:
     """Return a number or (T,) as an array (T,), finite."""
-    given = np.asarray(values, dtype=np.float64)
+    given = validation.numbers(values, name, StateError)
     if given.shape not in ((), (size,)):
         raise StateError(f"{name} must be one number or have shape ({size},) like time, not {given.shape}")
     if not np.isfinite(given).all():

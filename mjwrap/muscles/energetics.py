@@ -5,6 +5,7 @@ The equations are in `mjwrap/kernels/musculotendon/power.py` and `mjwrap/kernels
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -58,13 +59,13 @@ class Umberger2010:
     forbid_negative_power: bool = True
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.slow_twitch_ratio <= 1.0:
-            raise ModelError(
-                f"Umberger2010: slow_twitch_ratio must be in [0, 1], not {self.slow_twitch_ratio!r}"
-            )
+        share, most = "Umberger2010: slow_twitch_ratio", math.nextafter(1.0, 2.0)
+        validation.between(self.slow_twitch_ratio, 0.0, most, share, ModelError, "in [0, 1]")
+        for name in ("recruitment", "negative_work", "forbid_negative_power"):
+            validation.flag(getattr(self, name), f"Umberger2010: {name}", ModelError)
         for name in ("specific_tension", "density", "mass"):
             value = getattr(self, name)
-            if value is not None:
+            if value is not None or name != "mass":
                 validation.positive(value, f"Umberger2010: {name}", ModelError)
         for name in ("aerobic_factor", "minimum_heat_rate", "effort"):
             validation.not_negative(getattr(self, name), f"Umberger2010: {name}", ModelError)
@@ -152,6 +153,13 @@ def metabolic_constants(
     Raises:
         ModelError: the numbers of models and muscles differ.
     """
+    several = isinstance(model, Sequence) and all(
+        each is None or isinstance(each, Umberger2010) for each in model
+    )
+    good = (
+        model is None or isinstance(model, Umberger2010) or (several and not isinstance(model, str | bytes))
+    )
+    validation.require(good, "metabolism", "an Umberger2010, one for each muscle, or None", model, ModelError)
     models = [model] * len(law) if model is None or isinstance(model, Umberger2010) else list(model)
     if len(models) != len(law):
         raise ModelError(
@@ -204,7 +212,13 @@ def basal_power(body_mass: float, coefficient: float = 1.2, exponent: float = 1.
 
     Returns:
         The power [W].
+
+    Raises:
+        ModelError: the mass is not positive, or a number is not finite.
     """
+    validation.positive(body_mass, "body_mass", ModelError, "kg")
+    validation.not_negative(coefficient, "coefficient", ModelError)
+    validation.finite(exponent, "exponent", ModelError)
     return coefficient * body_mass**exponent
 
 

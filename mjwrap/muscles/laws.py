@@ -84,12 +84,11 @@ class FiberLaw:
             optimal_fiber_length=self.optimal_fiber_length,
             max_contraction_velocity=self.max_contraction_velocity,
         )
-        angle = self.pennation_angle
         validation.not_negative(self.tendon_slack_length, f"{self.law}: tendon_slack_length", ModelError, "m")
-        _require(self, 0.0 <= angle < 0.5 * math.pi, "pennation_angle", angle, "in [0, pi/2) [rad]")
+        angle = f"{self.law}: pennation_angle"
+        validation.between(self.pennation_angle, 0.0, 0.5 * math.pi, angle, ModelError, "in [0, pi/2) [rad]")
+        validation.choice(self.tendon, TENDONS, f"{self.law}: tendon", ModelError)
         validation.not_negative(self.damping, f"{self.law}: fiber_damping", ModelError)
-        if self.tendon not in TENDONS:
-            raise ModelError(f"{self.law}: tendon must be one of {', '.join(TENDONS)}, not {self.tendon!r}")
 
     @property
     def damping(self) -> float:
@@ -210,20 +209,21 @@ class MuJoCoMuscle:
     activated: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        for what, prm in (("", self.prm), ("passive ", self.passive or self.prm)):
-            _require(self, len(prm) == 9, f"{what}prm", len(prm), "nine numbers")
+        both = (("", self.prm), ("passive ", self.prm if self.passive is None else self.passive))
+        for what, given in both:
+            prm = validation.several(given, 9, f"{self.law}: {what}prm", ModelError)
             for name, value in zip(_PRM, prm, strict=True):
                 _require(self, math.isfinite(value), what + name, value, "finite")
             _require(self, prm[1] > prm[0], f"{what}range", prm[1], f"above {prm[0]}")
             validation.positive(prm[5], f"{self.law}: {what}lmax", ModelError)
-        _require(self, math.isfinite(self.acc0), "acc0", self.acc0, "finite")
+        validation.finite(self.acc0, f"{self.law}: acc0", ModelError)
         _positive(self, gear=self.gear)
-        low, high = self.length_range
+        low, high = validation.several(self.length_range, 2, f"{self.law}: length_range", ModelError)
         _require(
             self, high > low, "length range", low - high, "increasing: optimal fibre length is zero otherwise"
         )
         _positive(self, vmax=self.prm[6])
-        least, most = self.force_range
+        least, most = validation.several(self.force_range, 2, f"{self.law}: force_range", ModelError)
         _require(self, least <= most, "force range", least, f"at most {most}")
 
     @property

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError, PathError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import contact_rates, hessian
@@ -70,7 +71,7 @@ class Derivatives:
         twist[0, :3] = vector(origin_velocity, 3, "origin_velocity")
         twist[-1, :3] = vector(insertion_velocity, 3, "insertion_velocity")
         if twists is not None:
-            given = np.asarray(twists, dtype=np.float64)
+            given = validation.numbers(twists, "twists", GeometryError)
             if given.size or n:
                 if given.shape != (n, 6):
                     raise GeometryError(f"twists must have shape ({n}, 6), not {given.shape}")
@@ -134,7 +135,7 @@ class Derivatives:
         Raises `GeometryError` as `stiffness` does, and for a direction with a wrong shape or that is not finite.
         """
         count, points = self._path_points("stiffness")
-        given = np.array(direction, dtype=np.float64)
+        given = validation.numbers(direction, "direction", GeometryError).copy()
         shape = (len(self.contacts) + 2, 6)
         if given.shape != shape or not np.isfinite(given).all():
             raise GeometryError(f"direction must be finite and have shape {shape}, not {given.shape}")

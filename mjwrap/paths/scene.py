@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.spans import chain
@@ -72,6 +73,7 @@ class Obstacle:
             object.__setattr__(self, "quat", tuple(x / largest for x in self.quat))
         if self.hint is not None:
             object.__setattr__(self, "hint", vector(self.hint, 3, "Obstacle: hint"))
+        validation.flag(self.inside, "Obstacle: inside", GeometryError)
         if self.inside and not (self.surface.held_about and math.isinf(self.surface.z_limit)):
             raise GeometryError(
                 f"Obstacle: only a Sphere or an infinite Cylinder can have inside=True, not {self.surface!r}"
@@ -101,6 +103,10 @@ def owners(obstacles: Sequence[Obstacle | ViaPoint]) -> NDArray[np.int64]:
 
 def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
     """Return the kernels' rows for a list of obstacles, for a cold start; several for a surface with hollows."""
+    if not isinstance(obstacles, list | tuple):
+        wanted = "a list of Obstacle and ViaPoint, such as [mw.Obstacle(mw.Sphere(0.03))]"
+        validation.sequence(obstacles, "obstacles", GeometryError, wanted)
+        validation.require(hasattr(obstacles, "__getitem__"), "obstacles", wanted, obstacles, GeometryError)
     for k, obstacle in enumerate(obstacles):
         if not isinstance(obstacle, Obstacle | ViaPoint):
             raise GeometryError(f"obstacles[{k}] must be an Obstacle or a ViaPoint, not {obstacle!r}")

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjwrap import validation
+from mjwrap import html, validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import polyline, segments
 from mjwrap.kernels.spans import end_inside, hinted_sides
 from mjwrap.paths.contact import Contact
 from mjwrap.paths.derivatives import Derivatives
-from mjwrap.paths.scene import SAVED, Array, Point
+from mjwrap.paths.scene import SAVED, Array, Obstacle, Point, ViaPoint
 from mjwrap.paths.status import Status
 
 Ints = NDArray[np.int64]
+
+
+def _kind(obstacle: Obstacle | ViaPoint | None) -> str:
+    if obstacle is None:
+        return ""
+    return "via point" if isinstance(obstacle, ViaPoint) else repr(obstacle.surface)
 
 
 class PathSolution(Derivatives):
@@ -37,6 +45,7 @@ class PathSolution(Derivatives):
 
     def __init__(self, origin: Point, insertion: Point, node: Array, owner: Ints, saved: Array) -> None:
         self._owner = owner  # (rows,) the obstacle of each row of `node`
+        self._obstacles: tuple[Obstacle | ViaPoint, ...] = ()  # for pictures
         self._origin, self._insertion, self._node, self._saved = origin, insertion, node, saved
         self._ends = (0, len(node), *origin, *insertion)
         self.length = 0.0
@@ -120,6 +129,46 @@ class PathSolution(Derivatives):
             f"tangency error {self.tangency_error:.1e})"
         )
 
+    def _repr_html_(self) -> str:
+        from mjwrap.paths import pictures
+
+        facts = html.facts(
+            [
+                ("length", f"{self.length:.9g} m"),
+                (
+                    "status",
+                    self.status.name if self.converged else f"{self.status.name}: {self.status.message}",
+                ),
+                ("tangency error", f"{self.tangency_error:.1e}"),
+                ("iterations", self.iterations),
+            ],
+            "PathSolution",
+        )
+        rows = [
+            [
+                k,
+                _kind(obstacle),
+                pictures.describe(c.P),
+                pictures.describe(c.Q),
+                f"{c.arc_length:.5g}" * c.active,
+            ]
+            for k, (c, obstacle) in enumerate(
+                itertools.zip_longest(self.contacts, self._obstacles[: len(self.contacts)])
+            )
+        ]
+        heads = ["", "obstacle", "first contact [m]", "last contact [m]", "arc [m]"]
+        found = html.table(heads, rows) if rows else ""
+        return facts + found + pictures.svg(self.points(), self.contacts, self._obstacles)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the path, its contact points and the surfaces in space, with matplotlib, and return the axes.
+
+        axes: 3D axes to draw into; None for a new figure. Raises `MissingPackageError` without matplotlib.
+        """
+        from mjwrap.paths import pictures
+
+        return pictures.plot(self.points(), self.contacts, self._obstacles, axes)
+
     def points(self, spacing: float | None = None) -> Array:
         """Return points along the path, (m, 3), world [m], at most `spacing` [m] apart.
 
@@ -157,8 +206,7 @@ class PathSolution(Derivatives):
         (n + 2, 6): force [N], then moment about the world origin [N m], world frame. They sum to zero, and their power
         is -tension l̇ ("Velocity and force" in docs/derivation.md).
         """
-        if not np.isfinite(tension):
-            raise GeometryError(f"tension must be finite [N], not {tension!r}")
+        validation.require(validation.is_finite(tension), "tension", "finite [N]", tension, GeometryError)
         by_row = np.zeros((len(self._node) + 2, 6))
         segments.add_wrenches(self._count, self._segments, float(tension), by_row)
         wrench = np.zeros((len(self.contacts) + 2, 6))

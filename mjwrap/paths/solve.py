@@ -74,7 +74,7 @@ def solve_path(
     before = node[:, SAVED].copy()
     solution = PathSolution(here, there, node, owner, before)
     info = np.zeros((1, layout.INFO))
-    if method == "newton":
+    if isinstance(method, str) and method == "newton":
         if options:
             raise GeometryError(f"method 'newton' has no options; got {', '.join(options)}")
         direct = start is None
@@ -82,6 +82,7 @@ def solve_path(
     else:
         _solve_with(method, here, there, obstacles, node, start is not None, float(tol), options, info)
     solution._finish(info[0], before)
+    solution._obstacles = tuple(obstacles)
     return solution
 
 
@@ -99,8 +100,7 @@ def _solve_with(
     """Solve one span after the other with one of the paper's methods, and evaluate the result with the kernels."""
     from mjwrap import methods
 
-    if method not in methods.METHODS:
-        raise GeometryError(f"method must be one of newton, {', '.join(methods.METHODS)}, not {method!r}")
+    validation.choice(method, ("newton", *methods.METHODS), "method", GeometryError)
     if node[:, layout.INSIDE].any():
         raise GeometryError(f"method {method!r} cannot hold a path inside an obstacle; use method 'newton'")
     good, iterations, evaluations = True, 0, 0

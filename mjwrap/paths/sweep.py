@@ -35,6 +35,12 @@ class SweepSolution:
     iterations: NDArray[np.int64]
     evaluations: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        good = int((self.status == Status.CONVERGED).sum())
+        share = "all" if good == len(self.status) else f"{good}"
+        span = f", length {self.length.min():.6g} to {self.length.max():.6g} m" if len(self.length) else ""
+        return f"SweepSolution({len(self.status)} poses, {share} converged{span})"
+
     @property
     def converged(self) -> bool:
         """Whether every pose has a certified path."""
@@ -80,9 +86,10 @@ def solve_sweep(
         GeometryError: an array has a wrong shape or is not finite.
     """
     tol = validation.positive(tol, "tol", GeometryError)
-    n = len(obstacles)
+    validation.flag(warm, "warm", GeometryError)
     node, owner = pack(obstacles), owners(obstacles)
-    shape = np.shape(pos)
+    n = len(obstacles)
+    shape = validation.numbers(pos, "pos", GeometryError).shape
     if len(shape) != 3 or shape[1:] != (n, 3):
         raise GeometryError(f"pos must have shape (T, {n}, 3), not {shape}")
     poses = shape[0]

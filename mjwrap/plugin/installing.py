@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
+import warnings
 
 import mujoco
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
-from mjwrap.mjcf import MuscleDeclaration, marks, read_declarations, read_model, with_remedy
+from mjwrap.mjcf import (
+    MuscleDeclaration,
+    is_binary,
+    marks,
+    read_declarations,
+    read_model,
+    read_spec,
+    with_remedy,
+)
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
+from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
+from mjwrap.model.moment_columns import check_moment_columns
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
 from mjwrap.plugin.blocks.image import loaded_bodies, state_size
 from mjwrap.plugin.blocks.instance_muscles import read_muscles
-from mjwrap.plugin.blocks.transmission_part import check_moment_columns
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error
 from mjwrap.plugin.spec.actuators import disable_actuators, enable_actuator
@@ -28,8 +38,9 @@ from mjwrap.plugin.spec.configuration import (
     configuration_texts,
     spec_instances,
 )
+from mjwrap.plugin.spec.force_sensors import hidden_forces, hidden_forces_message
 from mjwrap.plugin.spec.instance import add_instance, prevent_sleep
-from mjwrap.plugin.spec.tendons import hide_tendons, remove_unneeded_tendons, show_tendon
+from mjwrap.plugin.spec.tendons import hide_tendons, left_out_tendons, remove_unneeded_tendons, show_tendon
 from mjwrap.plugin.spec.undo import undone_on_error
 
 _BOTH_OFF = int(mujoco.mjtDisableBit.mjDSBL_SPRING) | int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
@@ -63,11 +74,8 @@ def install(
             rule.
         VersionError: the layout of the installed MuJoCo could not be verified.
     """
-    if not isinstance(spec, mujoco.MjSpec):
-        raise ModelError(f"expected an MjSpec (mujoco.MjSpec.from_file), not {type(spec).__name__}")
-    if mode not in MODES:
-        raise ModelError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
-    check_side_rule(side_rule)
+    validation.of_type(spec, "MjSpec", "spec", ModelError)
+    _check_options(mode, keep_tendons, side_rule)
     register()
     with undone_on_error(spec):
         return _installed(spec, mode, keep_tendons, side_rule)
@@ -101,6 +109,9 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: in
     model = _compile(spec)
     if not keep_tendons:
         remove_unneeded_tendons(model, declared)
+    hidden = hidden_forces(model, muscles, left_out_tendons(model))
+    if hidden:
+        warnings.warn(hidden_forces_message(hidden), stacklevel=4)
     return model
 
 
@@ -159,7 +170,7 @@ def load(
     """Load an MJCF file and `install` the engine plugin, or load an MJB file of a model that has the plugin.
 
     Args:
-        path: the file.
+        path: the file; or "mjwrap:NAME", a model that comes with mjwrap, or "myo_sim:NAME", one of the myo-sim package.
         mode: as in `install`; "wrench" if None. An MJB file has its own mode.
         keep_tendons: as in `install`; only for MJCF files.
         side_rule: as in `install`; an MJB file has its own rule.
@@ -171,13 +182,12 @@ def load(
         ModelError: as in `install`, or the file cannot be loaded, or an MJB file has another mode or rule.
         VersionError: the layout of the installed MuJoCo could not be verified.
     """
-    check_side_rule(side_rule)
+    _check_options(WRENCH if mode is None else mode, keep_tendons, side_rule)
     register()
     model = read_model(path)
     renumber(model)
-    if Path(path).suffix != ".mjb":
-        spec = mujoco.MjSpec.from_file(os.fspath(path))
-        return install(spec, mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
+    if not is_binary(path):
+        return install(read_spec(path), mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
     instances = own_instances(model)
     saved = [configuration_at(model._address, i) for i in instances]
     modes, rules = {each.mode for each in saved}, {each.side_rule for each in saved}
@@ -198,6 +208,14 @@ def load(
     return model
 
 
+def _check_options(mode: str, keep_tendons: bool, side_rule: int | None) -> None:
+    if not isinstance(mode, str) or mode not in MODES:
+        shown = validation.described(mode)
+        raise ModelError(f"mode {shown} does not exist; modes: {', '.join(MODES)}")
+    validation.flag(keep_tendons, "keep_tendons", ModelError)
+    check_side_rule(side_rule)
+
+
 def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
     take_error()
     try:
@@ -207,6 +225,8 @@ def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
         told = (
             str(reason)
             if reason
-            else with_remedy(f"the model does not compile: {' '.join(str(error).split())}")
+            else with_candidates(
+                with_remedy(f"the model does not compile: {' '.join(str(error).split())}"), spec
+            )
         )
         raise ModelError(told) from reason

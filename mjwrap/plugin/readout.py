@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.mjcf.marks import own_instances
 from mjwrap.plugin.blocks.table import find_block
@@ -59,6 +60,11 @@ def instances(model: mujoco.MjModel) -> list[int]:
     return found
 
 
+def saved_modes(model: mujoco.MjModel) -> set[str]:
+    """Return the modes in which the plugin drives the muscles of an installed model."""
+    return {configuration_at(model._address, instance).mode for instance in instances(model)}
+
+
 def block_address(data: mujoco.MjData, instance: int) -> int:
     """Return the address of an instance's block."""
     address = find_block(data._address, instance)
@@ -76,6 +82,7 @@ def head_of(block: int) -> NDArray[np.int64]:
 
 def read(data: mujoco.MjData) -> Readout:
     """Return the plugin's last results for `data`: from `mj_forward`, or from the start of the last `mj_step`."""
+    validation.of_type(data, "MjData", "data", StateError)
     names: list[str] = []
     columns: dict[str, list[Any]] = {name: [] for name in (*_COLUMNS, "transmitted")}
     for instance in instances(data.model):

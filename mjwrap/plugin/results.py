@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.solved import segments
@@ -35,7 +36,7 @@ class Muscles(Results):
 
     def __init__(self, data: mujoco.MjData) -> None:
         if not isinstance(data, mujoco.MjData):
-            raise StateError(f"expected an MjData, not {type(data).__name__}")
+            validation.of_type(data, "MjData", "data", StateError)
         self.data = data
         self._instances = instances(data.model)
         plan, muscles = read_instances(data.model._address, self._instances)

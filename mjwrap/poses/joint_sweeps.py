@@ -58,6 +58,13 @@ class PoseMaker:
         """Return whether an equality determines the position of a joint."""
         return joint in self._coupled.leader
 
+    def leader(self, joint: int) -> str | None:
+        """Return the name of the joint that a joint follows ("" if it is held by itself), None if it is independent."""
+        if not self.follows(joint):
+            return None
+        head = self._coupled.leader[joint]
+        return name_of(self.model, mujoco.mjtObj.mjOBJ_JOINT, head) if head >= 0 else ""
+
     def axes(self, joint: int) -> range:
         """Return the axes to sweep a joint about: three for a ball."""
         return range(3 if int(self.model.jnt_type[joint]) == _BALL else 1)

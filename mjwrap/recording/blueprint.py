@@ -1,16 +1,17 @@
 """The layout of the viewer: the model in 3D beside the muscles' curves, in groups if there are many muscles."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from mjwrap.recording.axes import Bounds, common_range
 from mjwrap.recording.columns import TIMELINE
 from mjwrap.recording.groups import FREE
 from mjwrap.recording.scene import PAGE, Scene
-from mjwrap.recording.static_shapes import MESH
+from mjwrap.recording.static_shapes import MESH, invisible, see_through
 
 TITLES = {
     "activation": "activation",
@@ -26,12 +27,16 @@ GROUP_TITLES = {
     "activation": "mean activation",
     "tension": "sum of tensions [N]",
     "power": "sum of powers [W]",
-    "without_path": "muscles without a path",
+    "without_path": "names; muscles without a path",
 }
-LINE = 0.17  # height of a legend's line, as part of a small plot's
+SHARES = [2, 3]  # widths of the model and of the plots
+COLUMNS = 3  # of plots; with three rows each is tall enough for labelled ticks
+ROOMY = 4  # so many plots or fewer stand in two columns
+LEGEND_OF_GROUPS = "without_path"  # its plot is empty in most runs, and has the names
 LEGEND = 16  # joints whose names fit beside their curves
 SIDE = 6  # joints whose moment arms are shown together
 MANY = 100  # number of muscles from which arrows of forces would hide too much
+ROOM = 1.35  # distance of the eye, relative to the size of all muscles
 SCENERY = 2.0  # a mesh of the world that is so many times larger than all muscles counts as scenery
 
 
@@ -48,9 +53,13 @@ class First(NamedTuple):
         return float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) else 0.0
 
 
-def blueprint(scene: Scene, first: First) -> rrb.Blueprint:
-    """Return a 3D view of the muscles, and time series: one page, or a tab for each group and one for all groups."""
-    hidden = [*scene.hidden, *_scenery(scene, first.size)]
+def blueprint(scene: Scene, first: First, bounds: Bounds) -> rrb.Blueprint:
+    """Return a 3D view of the muscles, and time series: one page, or a tab for each group and one for all groups.
+
+    bounds: least and largest values of the curves by entity, as far as they are known, for the ranges of axes.
+    """
+    unseen = [scene.geoms[i] for i in scene.wrapping if invisible(scene.model, i)]
+    hidden = [*scene.hidden, *unseen, *_scenery(scene, first.size)]
     if len(scene.muscle_names) > MANY:
         hidden.append("world/forces")
     space = rrb.Spatial3DView(
@@ -58,79 +67,82 @@ def blueprint(scene: Scene, first: First) -> rrb.Blueprint:
         name="model",
         contents="$origin/**",
         eye_controls=_eye(scene, first),
-        overrides={path: rrb.EntityBehavior(visible=False) for path in hidden},
+        overrides=_looks(scene) | {path: rrb.EntityBehavior(visible=False) for path in hidden},
     )
-    curves = _curves(scene, first)
+    curves = _curves(scene, first, bounds)
     return rrb.Blueprint(
-        rrb.Horizontal(space, curves, column_shares=[1, 1]) if curves else space,
+        rrb.Horizontal(space, curves, column_shares=SHARES) if curves else space,
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
     )
 
 
-def _curves(scene: Scene, first: First) -> rrb.Container | None:
+def _curves(scene: Scene, first: First, bounds: Bounds) -> rrb.Container | None:
     tabs: list[rrb.Container] = []
     for group, pages in zip(scene.groups, scene.pages, strict=True):
-        grids = [_page(scene, page, first, _title(scene, page)) for page in pages]
+        grids = [_page(scene, page, first, bounds) for page in pages]
         tabs.append(grids[0] if len(grids) == 1 else rrb.Tabs(contents=grids, active_tab=0))
         tabs[-1].name = group.name
     if len(tabs) > 1:
-        tabs.insert(0, _overview(scene))
+        tabs.insert(0, _overview(scene, bounds))
     if len(scene.coordinates) > 1:
-        tabs.append(_moment_arms(scene))
+        tabs.append(_moment_arms(scene, bounds))
     if len(scene.joints) > 1:
-        tabs.append(_joints(scene))
+        tabs.append(_joints(scene, bounds))
     if not tabs:
         return None
-    tabs.append(_solver(scene))
+    tabs.append(_solver(scene, bounds))
     return rrb.Tabs(contents=tabs, active_tab=0)
 
 
 def _plot(
-    entities: Iterable[str], title: str, *, legend: bool = False, unit: bool = False, origin: str = "/"
+    entities: Iterable[str], title: str, bounds: Bounds, *, legend: bool = False, unit: bool = False
 ) -> rrb.TimeSeriesView:
+    entities = list(entities)
     return rrb.TimeSeriesView(
-        origin=origin,
+        origin="/",
         name=title,
         contents=[f"+ /{path}" for path in entities],
         plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
-        axis_y=rrb.ScalarAxis(range=(0.0, 1.0)) if unit else None,
+        axis_y=_axis((0.0, 1.0) if unit else common_range(bounds, entities)),
     )
 
 
-def _grid(views: Sequence[rrb.View], name: str, names: int = PAGE) -> rrb.Container:
-    """Return two columns of plots, with space for a legend of `names` lines in the first row; one column if few."""
-    if len(views) <= 3:
-        return rrb.Vertical(contents=views, name=name)
-    shares = [max(1.3, LINE * names + 0.4)] + [1.0] * ((len(views) - 1) // 2)
-    return rrb.Grid(contents=views, grid_columns=2, row_shares=shares, name=name)
+def _axis(ends: tuple[float, float] | None) -> rrb.ScalarAxis | None:
+    return None if ends is None else rrb.ScalarAxis(range=ends)
 
 
-def _overview(scene: Scene) -> rrb.Container:
+def _grid(views: Sequence[rrb.View], name: str) -> rrb.Container:
+    """Return plots in as few rows as possible: the viewer labels the ticks of a plot only if it is tall."""
+    columns = 1 if len(views) <= 2 else 2 if len(views) <= ROOMY else COLUMNS
+    return rrb.Grid(contents=views, grid_columns=columns, name=name)
+
+
+def _overview(scene: Scene, bounds: Bounds) -> rrb.Container:
     """Return the curves of whole groups."""
     views = [
-        _plot(scene.group_series[q], title, legend=q == "activation", unit=q == "activation")
+        _plot(scene.group_series[q], title, bounds, legend=q == LEGEND_OF_GROUPS, unit=q == "activation")
         for q, title in GROUP_TITLES.items()
     ]
-    legend = max(2.4, 1.5 * LINE * len(scene.groups))
-    return rrb.Vertical(contents=views, row_shares=[legend, 1, 1, 1], name="all groups")
+    return _grid(views, "all groups")
 
 
-def _page(scene: Scene, page: list[int], first: First, name: str) -> rrb.Container:
-    """Return plots of all quantities of up to `PAGE` muscles, and of their largest moment arms."""
+def _page(scene: Scene, page: list[int], first: First, bounds: Bounds) -> rrb.Container:
+    """Return plots of all quantities of up to `PAGE` muscles, of their largest moment arms, and with their names."""
     views: list[rrb.View] = [
-        _plot((scene.series[q][i] for i in page), TITLES[q], legend=q == "activation", unit=q == "activation")
+        _plot((scene.series[q][i] for i in page), TITLES[q], bounds, unit=q == "activation")
         for q in TITLES
         if q in scene.series and q not in ("status", "iterations")
     ]
-    views += _main_joint(scene, page, first)
-    if len(views) % 2:
-        views.append(_plot((scene.series["iterations"][i] for i in page), TITLES["iterations"]))
-    return _grid(views, name, len(page))
+    views += _main_joint(scene, page, first, bounds)
+    # the names stand where they hide the least
+    names = f"names; {TITLES['iterations']}"
+    views.append(_plot((scene.series["iterations"][i] for i in page), names, bounds, legend=True))
+    return _grid(views, _title(scene, page))
 
 
-def _main_joint(scene: Scene, page: list[int], first: First) -> list[rrb.View]:
+def _main_joint(scene: Scene, page: list[int], first: First, bounds: Bounds) -> list[rrb.View]:
     """Return plots of a page's moment arms about the coordinate for which their sum is largest; none if none cross."""
     best, best_sum = -1, 0.0
     for k, (coordinate, arms) in enumerate(zip(scene.coordinates, first.arms, strict=False)):
@@ -143,17 +155,18 @@ def _main_joint(scene: Scene, page: list[int], first: First) -> list[rrb.View]:
     shown = [i in page for i in coordinate.muscles]
     view = rrb.TimeSeriesView(
         origin="/",
-        name=f"moment arm about {coordinate.name} [m]",
+        name=f"moment arm [m] about {coordinate.name}",
         contents=[f"+ /{path}"],
         plot_legend=rrb.PlotLegend("LeftTop", visible=False),
+        axis_y=_axis(common_range(bounds, [path], shown)),
         overrides={path: rr.SeriesLines.from_fields(visible_series=shown)},
     )
     if best not in scene.joints:
         return [view]
-    return [view, _plot([scene.joints[best]], f"angle of {coordinate.name} [rad]")]
+    return [view, _plot([scene.joints[best]], f"angle [rad] of {coordinate.name}", bounds)]
 
 
-def _moment_arms(scene: Scene) -> rrb.Container:
+def _moment_arms(scene: Scene, bounds: Bounds) -> rrb.Container:
     """Return plots of the moment arms about every coordinate that can move, `SIDE` to a page."""
     free = [k for k, coordinate in enumerate(scene.coordinates) if not coordinate.follows]
     free = free or list(range(len(scene.coordinates)))
@@ -164,6 +177,7 @@ def _moment_arms(scene: Scene) -> rrb.Container:
             _plot(
                 [scene.moment_arms[k]],
                 scene.coordinates[k].name + (" [m]" if scene.coordinates[k].turns else ""),
+                bounds,
                 legend=len(scene.coordinates[k].muscles) <= PAGE,
             )
             for k in part
@@ -175,19 +189,19 @@ def _moment_arms(scene: Scene) -> rrb.Container:
     return pages[0]
 
 
-def _joints(scene: Scene) -> rrb.Container:
+def _joints(scene: Scene, bounds: Bounds) -> rrb.Container:
     """Return plots of the joints' positions, angles and lengths separately."""
     views = []
     for turns, title in ((True, "joint angles [rad]"), (False, "positions of slides [m]")):
         shown = [path for k, path in scene.joints.items() if scene.coordinates[k].turns is turns]
         if shown:
-            views.append(_plot(shown, title, legend=len(shown) <= LEGEND))
+            views.append(_plot(shown, title, bounds, legend=len(shown) <= LEGEND))
     return rrb.Vertical(contents=views, name="joints")
 
 
-def _solver(scene: Scene) -> rrb.Container:
+def _solver(scene: Scene, bounds: Bounds) -> rrb.Container:
     """Return plots of the path solver's status and iterations."""
-    views = [_plot(scene.series[q], TITLES[q]) for q in ("iterations", "status")]
+    views = [_plot(scene.series[q], TITLES[q], bounds) for q in ("iterations", "status")]
     return rrb.Vertical(*views, rrb.TextLogView(origin="/solver", name="paths lost and found"), name="solver")
 
 
@@ -208,6 +222,16 @@ def _scenery(scene: Scene, size: float) -> list[str]:
     ]
 
 
+def _looks(scene: Scene) -> dict[Any, Any]:
+    """Return the first look of the geoms, by entity: nothing hides a muscle."""
+    found: dict[Any, Any] = {}
+    for i, path in enumerate(scene.geoms):
+        look = see_through(scene.model, i, wraps=i in scene.wrapping)
+        if look is not None:
+            found[path] = look
+    return found
+
+
 def _eye(scene: Scene, first: First) -> rrb.EyeControls3D | None:
     """Return a camera that looks along the direction of the muscles' smallest extent, from the side with fewer bodies.
 
@@ -226,7 +250,7 @@ def _eye(scene: Scene, first: First) -> rrb.EyeControls3D | None:
     level /= np.linalg.norm(level)
     if len(bodies) and (bodies.mean(axis=0) - target) @ level > 0:
         level = -level
-    eye = target + 1.1 * size * (level + np.array([0.0, 0.0, 0.35]))
+    eye = target + ROOM * size * (level + np.array([0.0, 0.0, 0.35]))
     return rrb.EyeControls3D(
         position=eye, look_target=target, eye_up=[0.0, 0.0, 1.0], tracking_entity=_followed(scene)
     )

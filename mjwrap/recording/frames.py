@@ -9,12 +9,15 @@ import pyarrow as pa
 from mjwrap.errors import RecordingError
 from mjwrap.paths import Status
 from mjwrap.recording import columns
+from mjwrap.recording.axes import widen
 from mjwrap.recording.blueprint import First, blueprint
 from mjwrap.recording.scene import Scene
 from mjwrap.recording.stream import Stream
 from mjwrap.system.history import BufferPool
 
 if TYPE_CHECKING:
+    import rerun.blueprint as rrb
+
     from mjwrap.system.results import Results
 
 EARLY = 1e-6  # share of a period by which a row may be early, because times are rounded
@@ -83,6 +86,7 @@ class Buffers:
         self._force_scale = options.force_scale
         self._tables = _tables(scene)
         self._pool = BufferPool()
+        self._bounds: dict[str, np.ndarray] = {}  # of the columns of each table
         self._before = np.zeros(len(scene.muscle_names))  # status in the last row that was taken
         self._rows = self._frames = 0
         self._last_time = self._next_time = -math.inf
@@ -126,19 +130,31 @@ class Buffers:
         )  # after a step the data have the next state, the results belong to this one
         self._frames = frame + 1
 
-    def lay_out(self, stream: Stream) -> None:
-        """Log what needs the first frame: the viewer's layout, which looks at the muscles, and the welded bodies."""
-        if self._frames:
-            arms = np.abs(self._history.moment_arms(1)[0])
-            parts = np.split(arms, np.cumsum(self._widths)[:-1]) if self._widths else []
-            positions, quaternions = (array[0] for array in self._history.bodies(1))
-            first = First(self._history.polylines(1)[0], positions, parts)
-            if self._force_scale is None:
-                self._force_scale = ARROW * first.size / self._scene.strength
-            self._scene.log_welded(stream, positions, quaternions)
-        else:
-            first = First(np.empty((0, 3)), np.empty((0, 3)), [])
-        stream.blueprint(blueprint(self._scene, first))
+    def begin(self, stream: Stream) -> First:
+        """Log what needs the first frame, the welded bodies, and return that frame for the viewer's layout."""
+        if not self._frames:
+            return First(np.empty((0, 3)), np.empty((0, 3)), [])
+        arms = np.abs(self._history.moment_arms(1)[0])
+        parts = np.split(arms, np.cumsum(self._widths)[:-1]) if self._widths else []
+        positions, quaternions = (array[0] for array in self._history.bodies(1))
+        first = First(self._history.polylines(1)[0], positions, parts)
+        if self._force_scale is None:
+            self._force_scale = ARROW * first.size / self._scene.strength
+        self._scene.log_welded(stream, positions, quaternions)
+        return first
+
+    def layout(self, first: First) -> "rrb.Blueprint":
+        """Return the viewer's layout, with axes for the values that were taken until now."""
+        scene, bounds = self._scene, {}
+        for name, paths in (scene.series | {f"groups {q}": p for q, p in scene.group_series.items()}).items():
+            if name in self._bounds:
+                bounds |= {path: self._bounds[name][:, [i]] for i, path in enumerate(paths)}
+        if "joints" in self._bounds:
+            bounds |= {path: self._bounds["joints"][:, [i]] for i, path in enumerate(scene.joints.values())}
+        if "moment_arms" in self._bounds:
+            parts = np.split(self._bounds["moment_arms"], np.cumsum(self._widths)[:-1], axis=1)
+            bounds |= dict(zip(scene.moment_arms, parts, strict=True))
+        return blueprint(scene, first, bounds)
 
     def take(self, done: bool) -> list[pa.RecordBatch]:
         """Return all rows as record batches; the buffers are empty afterwards.
@@ -166,6 +182,8 @@ class Buffers:
             "without_path": self._summed(lost),
         }
         series = values | {f"groups {name}": groups[name] for name in self._scene.group_series}
+        for name, each in series.items():
+            widen(self._bounds, name, each)
         cells = [column for name, each in series.items() for column in self._scalars(name, each)]
         batches = [self._tables["scalars"].batch(times, cells)]
         before = np.vstack([self._before, values["status"][:-1]])
@@ -198,10 +216,13 @@ class Buffers:
             poses = (array[:, moving] for array in self._history.bodies(self._frames))
             batches.append(self._tables["poses"].batch(times, columns.pose_columns(*poses)))
         if self._joints:
-            cells = self._scalars("joint", self._qpos[: self._frames, self._joints])
+            positions = self._qpos[: self._frames, self._joints]
+            widen(self._bounds, "joints", positions)
+            cells = self._scalars("joint", positions)
             batches.append(self._tables["joints"].batch(self._qpos_time[: self._frames], cells))
         if self._widths:
             arms = self._history.moment_arms(self._frames)
+            widen(self._bounds, "moment_arms", arms)
             memory = self._pool.array("moment_arm", (arms.size,))
             batches.append(
                 self._tables["moment_arms"].batch(times, columns.vector_columns(arms, self._widths, memory))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError
 from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.model.kinematic_tree import crossed_dofs
@@ -51,6 +52,11 @@ def given_groups(wanted: Mapping[str, str | Iterable[str]], muscles: Sequence[st
 
     Raises RecordingError if a pattern matches no muscle, or a muscle is in two groups.
     """
+    wants = "a dict of patterns of muscle names by the name of the group"
+    validation.instance(wanted, Mapping, "groups", RecordingError, wants)
+    for name, patterns in wanted.items():
+        each = f"groups[{name!r}]"
+        validation.instance(patterns, str | Iterable, each, RecordingError, "a pattern of names, or several")
     owner: dict[int, str] = {}
     for name, patterns in wanted.items():
         for pattern in [patterns] if isinstance(patterns, str) else patterns:

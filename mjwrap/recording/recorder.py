@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjwrap import html, validation
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
 
 if TYPE_CHECKING:
+    from mjwrap.recording.blueprint import First
     from mjwrap.recording.frames import Buffers
     from mjwrap.recording.stream import Stream
     from mjwrap.system.results import Results
@@ -65,6 +67,12 @@ class Recorder(RunLog):
         flush_every: int | None = None,
         spacing: float | None = None,
     ) -> None:
+        if not hasattr(model, "nbody") or hasattr(model, "worldbody"):
+            validation.of_type(model, "MjModel", "model", RecordingError)
+        if not all(hasattr(muscles, name) for name in ("n", "names", "declarations")):
+            validation.of_type(muscles, "MuscleSystem", "muscles", RecordingError)
+        where = "True, False or the address of a viewer"
+        require("connect", connect, isinstance(connect, bool | str), where)
         require("rate", rate, rate is None or is_positive(rate), "a positive number of states per second")
         require("path_rate", path_rate, is_positive(path_rate), "a positive number of frames per second")
         scaled = force_scale is None or is_positive(force_scale)
@@ -85,6 +93,8 @@ class Recorder(RunLog):
                 target.discard()
             raise
         self._laid_out = False
+        self._first: First | None = None
+        self._names, self._logged = list(muscles.names), 0
         self._begin(str(connect if target is None else target.path), target, self._stream.abandon)
 
     def log(self, data: Any) -> None:
@@ -96,10 +106,20 @@ class Recorder(RunLog):
         if self._ended:
             raise RecordingError(f"cannot log to '{self._place}': {self._ended}")
         added = self._buffers.add(data)
+        self._logged += added
         if added and not self._laid_out:
             self._guarded(self._lay_out)
         if (added and self._buffers.full) or (self._live and time.perf_counter() >= self._batch_due):
             self._guarded(self._flush)
+
+    def __repr__(self) -> str:
+        state = f"ended: {self._ended}" if self._ended else "open"
+        rows = f"{self._logged} state{'s' * (self._logged != 1)}"
+        return f"Recorder({self._place!r}, {len(self._names)} muscles, {rows}, {state})"
+
+    def _repr_html_(self) -> str:
+        facts = [("goes to", self._place), ("muscles", ", ".join(self._names)), ("states", self._logged)]
+        return html.facts([*facts, ("now", self._ended or "open")], "Recorder")
 
     @property
     def _empty(self) -> bool:
@@ -107,7 +127,9 @@ class Recorder(RunLog):
 
     def _lay_out(self) -> None:
         if not self._laid_out:
-            self._buffers.lay_out(self._stream)
+            self._first = self._buffers.begin(self._stream)
+            if self._live:  # a viewer needs the layout at once; that of a file knows the ranges of all curves
+                self._stream.blueprint(self._buffers.layout(self._first))
             self._laid_out = True
 
     def _flush(self) -> None:
@@ -117,6 +139,8 @@ class Recorder(RunLog):
     def _finish(self) -> None:
         self._lay_out()
         self._flush()
+        if not self._live and self._first is not None:
+            self._stream.blueprint(self._buffers.layout(self._first))
         self._stream.finish()
 
 

@@ -13,6 +13,8 @@ PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
 
 DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
 WRAP_ALPHA = 0.35
+BODY_ALPHA = 0.5  # at first: bones stay recognisable, and muscles are seen behind and inside them
+WIRE_ALPHA = 0.6
 SMOOTH = 49  # points on the circles of a surface
 FLOOR = 0.2  # brightness of a plane, which would be too bright without its texture
 
@@ -54,6 +56,36 @@ def geom_shape(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
         faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]
         return _mesh(vertices, faces, rgba)
     return None
+
+
+def see_through(model: Any, geom: int, *, wraps: bool) -> rr.AsComponents | None:
+    """Return how the viewer shows a geom at first, so that it hides no muscle; None if as recorded.
+
+    Bodies are translucent; a wrapping surface is a wireframe with a translucent filling.
+    """
+    kind = int(model.geom_type[geom])
+    rgba = _rgba(model, geom)
+    # shown by hand, a surface without opacity would have black lines
+    rgba[3] = WIRE_ALPHA if wraps else min(rgba[3], BODY_ALPHA)
+    look: Any = {"colors": [rgba]}
+    if wraps:
+        look["fill_mode"] = "TransparentFillMajorWireframe"
+    if kind in (SPHERE, ELLIPSOID):
+        return rr.Ellipsoids3D.from_fields(**look)
+    if kind == CYLINDER:
+        return rr.Cylinders3D.from_fields(**look)
+    if kind == CAPSULE:
+        return rr.Capsules3D.from_fields(**look)
+    if kind == BOX:
+        return rr.Boxes3D.from_fields(**look)
+    if kind in (MESH, SDF) and model.geom_dataid[geom] >= 0:
+        return rr.Mesh3D.from_fields(albedo_factor=rgba)
+    return None
+
+
+def invisible(model: Any, geom: int) -> bool:
+    """Return whether the model gives a geom no opacity."""
+    return bool(_rgba(model, geom)[3] == 0.0)
 
 
 def draws(model: Any, geom: int, surface: Surface) -> bool:

@@ -1,4 +1,4 @@
-"""The engine of a run: a `MuscleSystem` that is stepped, or the engine plugin inside MuJoCo."""
+"""The engine of a run: a `CableSystem` that is stepped, or the engine plugin inside MuJoCo."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import Protocol
 import mujoco
 
 from mjwrap.errors import ModelError, PathError, StateError
+from mjwrap.mjcf import has_plugin, read_declarations, read_model
 from mjwrap.paths import Status
 from mjwrap.runs.models import load, load_spec
 from mjwrap.runs.state_tables import put_own
-from mjwrap.system import MuscleSystem
+from mjwrap.system import CableSystem, MuscleSystem, is_cable
 from mjwrap.system.checks import resets
 from mjwrap.text import counted
 
-MODES = ("python", "wrench", "transmission")
+MODES = PYTHON, WRENCH, TRANSMISSION = "python", "wrench", "transmission"
+NO_MUSCLE = "it is not a muscle; modes python and transmission drive it along mjwrap's path"
 
 
 class Engine(Protocol):
@@ -39,11 +41,11 @@ class Engine(Protocol):
 
 
 class PythonEngine:
-    """A `MuscleSystem` that is stepped."""
+    """A `CableSystem` that is stepped."""
 
     def __init__(self, source: str, strict: bool, side_rule: int | None = None) -> None:
         self.model = load(source)
-        self.muscles = MuscleSystem(self.model, strict=strict, side_rule=side_rule)
+        self.muscles: MuscleSystem = CableSystem(self.model, strict=strict, side_rule=side_rule)
         self.data = self.sampled = mujoco.MjData(self.model)
 
     def step(self) -> None:
@@ -73,7 +75,7 @@ class PluginEngine:
         else:
             self.model = plugin.install(load_spec(source), mode, side_rule=side_rule)
         self.data = mujoco.MjData(self.model)
-        self.muscles = MuscleSystem(load(source), side_rule=side_rule)
+        self.muscles = _sampler(load(source), mode, side_rule)
         self.sampled = mujoco.MjData(self.muscles.model)
         self._strict = strict
         self._excitations = plugin.excitations(self.data)
@@ -126,10 +128,39 @@ class PluginEngine:
         return found
 
 
-def start_engine(source: str, mode: str, strict: bool, side_rule: int | None = None) -> Engine:
-    """Return the engine of a model (a file, or "myo_sim:NAME") for a mode of `MODES`.
+def _sampler(model: mujoco.MjModel, mode: str, side_rule: int | None) -> MuscleSystem:
+    """Return the muscles and cables that a mode of the plugin drives; in mode "wrench" cables stay with MuJoCo."""
+    if mode == TRANSMISSION:
+        return CableSystem(model, side_rule=side_rule, transmission=True)
+    cables = _cables(model, side_rule)  # read before the MuscleSystem disables the muscles
+    muscles = MuscleSystem(model, side_rule=side_rule)
+    muscles.native |= dict.fromkeys(cables, NO_MUSCLE)
+    return muscles
 
-    "python" is `MuscleSystem`; the others are modes of the plugin's `install`. strict: raise `PathError` at the first
+
+def _cables(model: mujoco.MjModel, side_rule: int | None = None) -> list[str]:
+    """Return the actuators on spatial tendons that are not muscles and can pull along mjwrap's paths."""
+    found = read_declarations(model, cables=True, side_rule=side_rule).muscles
+    return [muscle.name for muscle in found if is_cable(muscle)]
+
+
+def film_mode(source: str) -> str:
+    """Return the mode of the plugin in which all muscles and cables of a model pull along mjwrap's paths.
+
+    That is "transmission" for a model with cables, else "wrench"; a binary file keeps the mode with which it was saved.
+    """
+    model = read_model(source) if source.lower().endswith(".mjb") else load(source)
+    if has_plugin(model):
+        from mjwrap.plugin.readout import saved_modes
+
+        return next(iter(saved_modes(model)))
+    return TRANSMISSION if _cables(model) else WRENCH
+
+
+def start_engine(source: str, mode: str, strict: bool, side_rule: int | None = None) -> Engine:
+    """Return the engine of a model (a file, "mjwrap:NAME" or "myo_sim:NAME") for a mode of `MODES`.
+
+    "python" is `CableSystem`; the others are modes of the plugin's `install`. strict: raise `PathError` at the first
     step at which a muscle has no path. side_rule: as for `MuscleSystem` and `install`.
     """
     if mode not in MODES:

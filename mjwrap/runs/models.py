@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
-from typing import Any
 
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf import has_plugin, name_of, names, read_model
+from mjwrap.mjcf import has_plugin, name_of, names, read_model, read_spec
+from mjwrap.runs.angles import check_position
 
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -17,15 +16,14 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-_MYO = "myo_sim:"
 
 
 def load(source: str) -> mujoco.MjModel:
-    """Load an MJCF or MJB file, or "myo_sim:NAME", a model of the myo-sim package; `ModelError` if that fails.
+    """Load an MJCF or MJB file, or a model by name, "mjwrap:NAME" or "myo_sim:NAME"; `ModelError` if that fails.
 
     A model with the engine plugin is returned without it, as it was before `install`.
     """
-    model = load_spec(source).compile() if source.startswith(_MYO) else read_model(source)
+    model = read_model(source)
     if has_plugin(model):
         from mjwrap.plugin import without_plugin
 
@@ -34,23 +32,8 @@ def load(source: str) -> mujoco.MjModel:
 
 
 def load_spec(source: str) -> mujoco.MjSpec:
-    """Return the spec of an MJCF file or of "myo_sim:NAME"; `ModelError` for an MJB file, which has no spec."""
-    if not source.startswith(_MYO):
-        read_model(source)  # raises an error if the file is wrong
-        if source.lower().endswith(".mjb"):
-            raise ModelError(f"'{source}' is an MJB file, which cannot be changed; give its XML instead")
-        return mujoco.MjSpec.from_file(source)
-    name = source.removeprefix(_MYO)
-    try:
-        import myo_sim
-    except ImportError:
-        raise ModelError(f"'{source}' needs the myo-sim package: pip install 'mjwrap[myo]'") from None
-    known = sorted({*myo_sim.REGISTRY, *myo_sim._composed_models()})
-    if name not in known:
-        raise ModelError(f"myo_sim has no model '{name}'; it has: {', '.join(known)}")
-    postures = {"postures": True} if myo_sim.list_postures(name) else None
-    spec: Any = myo_sim.load_spec(name, build_kwargs=postures)
-    return spec
+    """Return the spec of an MJCF file or of a model by name; `ModelError` for an MJB file, which has no spec."""
+    return read_spec(source)
 
 
 def start_keyframe(model: mujoco.MjModel, name: str | None) -> int:
@@ -75,7 +58,8 @@ def start_state(
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Mapping[str, float]) -> None:
     """Reset data to a keyframe (-1: to qpos0), then set hinges and slides to positions [rad, m] by name.
 
-    Warns if a position lies outside its joint's range. Raises `ModelError` for a name that is not a hinge or slide.
+    Warns if a position lies outside its joint's range. Raises `ModelError` for a name that is not a hinge or slide, and
+    for positions that only degrees can explain (`check_position`).
     """
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
@@ -83,12 +67,7 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: M
         entry = f"{name}={value:g}"
         joint = find_joint(model, name, entry)
         data.qpos[model.jnt_qposadr[joint]] = value
-        low, high = model.jnt_range[joint]
-        if model.jnt_limited[joint] and not low <= value <= high:
-            unit = "m" if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
-            warnings.warn(
-                f"'{entry}' lies outside the joint's range, {low:g} to {high:g} {unit}", stacklevel=2
-            )
+        check_position(model, joint, value, f"'{entry}'")
 
 
 def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:

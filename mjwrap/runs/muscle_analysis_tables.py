@@ -1,4 +1,4 @@
-"""Tables in the layout of OpenSim's MuscleAnalysis: a file for each quantity, a column for each muscle."""
+"""Tables in the layout of OpenSim's MuscleAnalysis and ProbeReporter: a file for each quantity."""
 
 from __future__ import annotations
 
@@ -12,10 +12,52 @@ from numpy.typing import NDArray
 from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import dof_names
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.model.kinematic_tree import crossed_dofs
+from mjwrap.muscles.energetics import Energetics, Umberger2010, basal_power
+from mjwrap.muscles.fibers import FiberState
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
+
+
+class _Sample(NamedTuple):
+    """What the files are written from: moment arms (n, nv) [m], fibres, powers, and length, tension (n,)."""
+
+    arms: Array
+    fibers: FiberState
+    energy: Energetics
+    length: Array
+    tension: Array
+
+
+Read = Callable[[_Sample], Array]
+
+# OpenSim's names of the files that have a column for every muscle
+WHOLE: dict[str, Read] = {
+    "Length": lambda s: s.length,
+    "TendonForce": lambda s: s.tension,
+    "MuscleActuatorPower": lambda s: s.energy.muscle_power,
+}
+# and of those that have one for every muscle with a fibre
+FIBERS: dict[str, Read] = {
+    "FiberLength": lambda s: s.fibers.length,
+    "NormalizedFiberLength": lambda s: s.fibers.normalized_length,
+    "FiberVelocity": lambda s: s.fibers.velocity,
+    "NormFiberVelocity": lambda s: s.fibers.normalized_velocity,
+    "PennationAngle": lambda s: s.fibers.pennation,
+    "PennationAngularVelocity": lambda s: s.fibers.pennation_rate,
+    "TendonLength": lambda s: s.fibers.tendon_length,
+    "FiberForce": lambda s: s.fibers.force,
+    "ActiveFiberForce": lambda s: s.fibers.active_force,
+    "PassiveFiberForce": lambda s: s.fibers.passive_force,
+    "ActiveFiberForceAlongTendon": lambda s: s.fibers.active_force_along_tendon,
+    "PassiveFiberForceAlongTendon": lambda s: s.fibers.passive_force_along_tendon,
+    "FiberActivePower": lambda s: s.energy.active_power,
+    "FiberPassivePower": lambda s: s.energy.passive_power + s.energy.damping_power,
+    "TendonPower": lambda s: s.energy.tendon_power,
+}
+METABOLICS = "metabolics"  # OpenSim's name of the probe: the beginning of its columns
 
 
 class _Part(NamedTuple):
@@ -23,16 +65,18 @@ class _Part(NamedTuple):
 
     output: PartFile
     writer: RowWriter
-    read: Callable[[Array], Array]
+    read: Read
 
 
 class MuscleAnalysisTables:
     """Write a row to every file for every sample.
 
-    Length, FiberLength (of muscles whose law has fibres) and TendonForce; MomentArm_JOINT, −∂l/∂q, for every degree
-    of freedom that a muscle spans, 0 for muscles that do not span it. SI units. The files are called
-    PREFIX_MuscleAnalysis_QUANTITY.sto. open_file: opens the `PartFile` of such a name. Raises `RecordingError` if a
-    file cannot be written.
+    The files PREFIX_MuscleAnalysis_QUANTITY.sto are those of `WHOLE` and `FIBERS`, and MomentArm_JOINT and
+    Moment_JOINT for every degree of freedom that moves a muscle, 0 for muscles that it does not move. Moment arms are
+    −dl/dq with coupled joints moved along, as in OpenSim; about a joint that follows another one they are −∂l/∂q alone.
+    PREFIX_ProbeReporter_probes.sto has the metabolic power [W] of OpenSim's Umberger2010MuscleMetabolicsProbe with its
+    default constants: metabolics_TOTAL, metabolics_BASAL and metabolics_MUSCLE. SI units, angles in rad. open_file:
+    opens the `PartFile` of such a name. Raises `RecordingError` if a file cannot be written.
     """
 
     def __init__(
@@ -44,31 +88,58 @@ class MuscleAnalysisTables:
     ) -> None:
         self._muscles = muscles
         self._open = open_file
+        self._couplings = CoupledJoints(model)
         self._parts: list[_Part] = []
         names, dofs = muscles.names, dof_names(model)
         fibers = [i for i, m in enumerate(muscles.declarations) if hasattr(m.parameters, "tendon")]
-        moved = np.flatnonzero(crossed_dofs(model, muscles.declarations).any(axis=0)).tolist()
-        self._add(prefix, "Length", names, lambda _: muscles.length)
-        if fibers:
+        for quantity, read in WHOLE.items():
+            self._add(f"{prefix}_MuscleAnalysis", quantity, names, read)
+        for quantity, read in FIBERS.items() if fibers else ():
             with_fibers = [names[i] for i in fibers]
-            self._add(prefix, "FiberLength", with_fibers, lambda _: muscles.fiber_length[fibers])
-        self._add(prefix, "TendonForce", names, lambda _: muscles.tension)
-        for dof in moved:
-            self._add(prefix, f"MomentArm_{dofs[dof]}", names, lambda jacobian, d=dof: -jacobian[:, d])
+            self._add(f"{prefix}_MuscleAnalysis", quantity, with_fibers, _only(read, fibers))
+        for dof in self._moving(model):
+            name = dofs[dof].replace("/", "_")
+            self._add(f"{prefix}_MuscleAnalysis", f"MomentArm_{name}", names, lambda s, d=dof: s.arms[:, d])
+            self._add(
+                f"{prefix}_MuscleAnalysis", f"Moment_{name}", names, lambda s, d=dof: s.arms[:, d] * s.tension
+            )
+        if fibers:
+            basal = basal_power(float(model.body_mass.sum()))
+            heads = [f"{METABOLICS}_{name}" for name in ("TOTAL", "BASAL", *(names[i] for i in fibers))]
 
-    def _add(self, prefix: str, quantity: str, names: list[str], read: Callable[[Array], Array]) -> None:
-        path = f"{prefix}_MuscleAnalysis_{quantity.replace('/', '_')}.sto"
-        output = self._open(path)
+            def metabolic(sample: _Sample) -> Array:
+                power = sample.energy.metabolic_power[fibers]
+                return np.concatenate([[power.sum() + basal, basal], power])
+
+            self._add(f"{prefix}_ProbeReporter", "probes", heads, metabolic)
+
+    def _moving(self, model: mujoco.MjModel) -> list[int]:
+        """Return the degrees of freedom that move a muscle, alone or with those that follow them."""
+        crossed = np.atleast_1d(crossed_dofs(model, self._muscles.declarations).any(axis=0))
+        moving = crossed.copy()
+        leaders = self._couplings.leader
+        for joint in leaders:
+            head = self._couplings.head(joint)
+            if head >= 0:
+                moving[model.jnt_dofadr[head]] |= crossed[model.jnt_dofadr[joint]]
+        return np.flatnonzero(moving).tolist()
+
+    def _add(self, prefix: str, quantity: str, names: list[str], read: Read) -> None:
+        output = self._open(f"{prefix}_{quantity}.sto")
         with output.writing():
             writer = RowWriter(output.open_text(), ".sto", names, {"header": quantity})
         self._parts.append(_Part(output, writer, read))
 
     def log(self, data: mujoco.MjData) -> None:
         """Write the results at the present state."""
-        jacobian = self._muscles.length_jacobian(data)
+        muscles, couplings = self._muscles, self._couplings
+        arms = -muscles.length_jacobian(data)
+        arms[:, couplings.independent] = arms @ couplings.matrix(data.qpos)
+        energy = muscles.energetics(Umberger2010())
+        sample = _Sample(arms, muscles.fiber_state(), energy, muscles.length, muscles.tension)
         for part in self._parts:
             with part.output.writing():
-                part.writer.add(data.time, part.read(jacobian))
+                part.writer.add(data.time, part.read(sample))
 
     def close(self) -> None:
         """Complete the files and give them their names."""
@@ -76,3 +147,7 @@ class MuscleAnalysisTables:
             with part.output.writing():
                 part.writer.finish()
             part.output.publish()
+
+
+def _only(read: Read, muscles: list[int]) -> Read:
+    return lambda sample: read(sample)[muscles]

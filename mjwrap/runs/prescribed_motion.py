@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import SignalError
 from mjwrap.files import SUFFIXES, read_table
+from mjwrap.runs.angles import Angle, check_column, check_position, pattern_in_radians
 from mjwrap.runs.models import find_joint, single_joints
 from mjwrap.runs.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
 
@@ -52,11 +53,13 @@ class PrescribedMotion:
     Args:
         model: the model, in which the armature of these joints is changed.
         entries: "JOINT=constant:...", "JOINT=sine:...", "JOINT=cosine:...", or a table (.csv, .sto, .mot, .npz) with a
-            column for each joint. Positions are in rad or m, or in degrees if the table's header says so.
+            column for each joint; a number alone is a constant. Positions are in rad or m, with "deg" after a number
+            in degrees ("knee=90deg", "knee=sine:30deg,1"), and in degrees if the table's header says so.
         option: name of the command-line option of the entries, for messages.
 
     Raises:
-        SignalError: an entry is not valid.
+        SignalError: an entry is not valid, or positions are so far outside a joint's range that only degrees explain
+            them.
         ModelError: a joint does not exist.
     """
 
@@ -70,15 +73,17 @@ class PrescribedMotion:
                 known = ", ".join(single_joints(model)) or "none"
                 named = f"{option} '{entry}'".lstrip()
                 raise SignalError(
-                    f"{named}: write JOINT=PATTERN, such as knee=sine:0.5,1, or name a table "
+                    f"{named}: write JOINT=PATTERN, such as knee=sine:0.5,1 or knee=90deg, or name a table "
                     f"({', '.join(SUFFIXES)}); joints: {known}"
                 )
             if equals:
-                found[find_joint(model, name, entry)] = _smooth(name, pattern)
+                joint = find_joint(model, name, entry)
+                found[joint] = _smooth(model, joint, name, pattern)
             else:
                 table, joints = read_table(entry), single_joints(model)
                 for column, driven in match_columns(table, list(joints), "hinge or slide").items():
                     joint = joints[driven]
+                    check_column(model, joint, table, column)
                     turns = table.in_degrees and int(model.jnt_type[joint]) == _HINGE
                     values = np.radians(table[column]) if turns else table[column]
                     found[joint] = Spline(table.time, values)
@@ -107,13 +112,23 @@ class PrescribedMotion:
             data.qfrc_applied[self._dofs] = self._inertia * change / h
 
 
-def _smooth(name: str, pattern: str) -> SmoothSignal:
-    signal = parse_pattern(pattern)(name, 0, 1)
+def _smooth(model: mujoco.MjModel, joint: int, name: str, pattern: str) -> SmoothSignal:
+    radians, degrees = pattern_in_radians(pattern)
+    signal = parse_pattern(radians)(name, 0, 1)
     if not isinstance(signal, Constant | Sine):
         raise SignalError(
             f"'{name}={pattern}': a joint can follow a constant, sine, cosine or file; it cannot jump"
         )
+    ends = (signal.level,) if isinstance(signal, Constant) else _extremes(signal)
+    for end in ends:
+        value = Angle(end) if degrees else end
+        check_position(model, joint, value, f"'{name}={pattern}'", SignalError)
     return signal
+
+
+def _extremes(signal: Sine) -> tuple[float, float]:
+    reach = abs(signal.amplitude)
+    return signal.offset - reach, signal.offset + reach
 
 
 def check_free(model: mujoco.MjModel, joints: Sequence[int], positions: Mapping[str, float]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -14,12 +15,16 @@ import numpy as np
 from mjwrap.errors import ModelError
 from mjwrap.files import Table
 from mjwrap.paths import Status
+from mjwrap.runs.compile_time import CompileClock, rehearse
+from mjwrap.runs.control_limits import check_levels
 from mjwrap.runs.engine import MODES, start_engine
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
+from mjwrap.runs.table_spans import uncovered
 
+CONTROLS_AT = 101  # times at which `Simulation.driven` looks
 Log = Callable[[mujoco.MjData], object]  # called with the state of a sample
 
 
@@ -57,7 +62,7 @@ class RunSettings:
 
 
 class WallTime(NamedTuple):
-    """Wall time [s] of the simulation, and of sampling, drawing and writing."""
+    """Wall time [s] of the simulation, and of sampling, drawing and writing, without compiling kernels."""
 
     simulation: float
     outputs: float
@@ -70,7 +75,7 @@ class Simulation:
     the results at the last sample.
 
     Args:
-        source: an MJCF or MJB file, or "myo_sim:NAME".
+        source: an MJCF or MJB file, "mjwrap:NAME" or "myo_sim:NAME".
         settings: the settings of the run.
         option: name of the command-line option for prescribed joints, for messages.
 
@@ -90,9 +95,16 @@ class Simulation:
                 model.opt.integrator = _integrator(settings.integrator)
         key = start_keyframe(engine.model, settings.keyframe)
         set_state(engine.model, engine.data, key, settings.positions)
+        self.start = (
+            engine.data.qpos.copy()
+        )  # (nq,) positions at the start, also of joints that are prescribed
         self.excitation = Excitation(engine.muscles, settings.excitation, settings.seed)
+        check_levels(engine.muscles.model, self.excitation)
         self.prescribed = PrescribedMotion(engine.model, settings.prescribed, option=option)
         check_free(engine.model, self.prescribed.joints, settings.positions)
+        entries = (*settings.excitation, *settings.prescribed)
+        if told := uncovered(entries, self.duration, self._timestep):
+            warnings.warn(told, stacklevel=2)
 
     @property
     def duration(self) -> float:
@@ -107,14 +119,27 @@ class Simulation:
     def _steps(self) -> int:
         return max(1, math.ceil(self.settings.duration / self._timestep - 1e-6))
 
+    @property
+    def driven(self) -> bool:
+        """Whether a control or an excitation is not zero at some time of the run."""
+        muscles, data = self.muscles, self.engine.data
+        signals = self.excitation.signals.values()
+        times = np.linspace(0.0, self.duration, CONTROLS_AT).tolist() if signals else []
+        return (
+            bool(data.ctrl.any() or muscles.excitation.any())
+            or any(signal.value(t) != 0.0 for signal in signals for t in times)
+        )  # fmt: skip
+
     def begin(self) -> None:
-        """Evaluate everything at the start, which also compiles the kernels before time is measured.
+        """Evaluate everything at the start, and rehearse a step, which compiles kernels before time is measured.
 
         Raises `ModelError` if a muscle has no path at the start, because an end lies inside a surface: it has no last
         valid force to keep.
         """
         self.prescribed.place(self.engine.data)
+        self.start = self.engine.data.qpos.copy()
         self.excitation.write(self.engine.data)
+        rehearse(self.engine)
         self.engine.evaluate()
         muscles = self.muscles
         inside = muscles.held & (muscles.status == Status.ENDPOINT_INSIDE)
@@ -144,36 +169,37 @@ class Simulation:
         """
         data, timestep, steps = self.engine.data, self._timestep, self._steps
         stride = max(1, round(self.settings.sample / timestep))
-        started, outputs = time.perf_counter(), 0.0
-        for k in range(steps):
-            if k % stride == 0:
-                outputs += self._sample(logs)
-                progress(0.0 if k == 0 else stride * timestep)
-            if stopped():
-                break
-            self.prescribed.drive(data)
-            self.engine.step()
-            self.prescribed.place(data)
-            self.excitation.write(data)
-        else:
-            outputs += self._sample(logs)
-        return WallTime(time.perf_counter() - started - outputs, outputs)
+        with CompileClock() as compiling:
+            started, outputs = time.perf_counter(), 0.0
+            for k in range(steps):
+                if k % stride == 0:
+                    outputs += self._sample(logs, compiling)
+                    progress(0.0 if k == 0 else stride * timestep)
+                if stopped():
+                    break
+                self.prescribed.drive(data)
+                self.engine.step()
+                self.prescribed.place(data)
+                self.excitation.write(data)
+            else:
+                outputs += self._sample(logs, compiling)
+            return WallTime(time.perf_counter() - started - compiling.seconds - outputs, outputs)
 
-    def _sample(self, logs: Sequence[Log]) -> float:
-        """Log the present state; return the wall time [s] of this."""
-        started = time.perf_counter()
+    def _sample(self, logs: Sequence[Log], compiling: CompileClock) -> float:
+        """Log the present state; return the wall time [s] of this, without compilation."""
+        started = time.perf_counter() - compiling.seconds
         if logs:
             self.engine.evaluate()
             for log in logs:
                 log(self.engine.sampled)
-        return time.perf_counter() - started
+        return time.perf_counter() - compiling.seconds - started
 
 
 def simulate(source: str, settings: RunSettings | None = None, kinds: Iterable[str] = DEFAULT_KINDS) -> Table:
     """Run a model and return its samples as a table, as `mjwrap run --out` writes it.
 
     Args:
-        source: an MJCF or MJB file, or "myo_sim:NAME".
+        source: an MJCF or MJB file, "mjwrap:NAME" or "myo_sim:NAME".
         settings: the settings of the run; None for the defaults.
         kinds: the quantities in the table, such as "qpos", "length" or "moment_arm", as for `mjwrap run --columns`.
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import TableError
 from mjwrap.files import Table
 from mjwrap.mjcf import act_names, dof_names, qpos_names
+from mjwrap.runs.angles import check_column
 from mjwrap.runs.excitation import control_names
 from mjwrap.runs.models import single_joints
 from mjwrap.runs.run_table import MUSCLE_KINDS
@@ -77,7 +78,7 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
     Columns: "qpos:JOINT", "qvel:JOINT", "act:ACTUATOR", "ctrl:ACTUATOR", "activation:MUSCLE", "fiber_length:MUSCLE" as
     in tables of `mjwrap run`; "qpos[3]" by index; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
     "MUSCLE/fiber_length" as in OpenSim's files, with or without a path before them. "act" overrides other columns for
-    the same state. Rotations are in rad, or in degrees if the header says so. Velocities that are missing are computed
+    the same state. Hinges are in rad, or in degrees if the header says so. Velocities that are missing are computed
     as differences of the positions.
 
     Args:
@@ -90,7 +91,8 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
         The states.
 
     Raises:
-        TableError: no column names a joint, or the size of an array does not fit the model.
+        TableError: no column names a joint, the size of an array does not fit the model, or angles are so far outside
+            a joint's range that only degrees explain them.
     """
     reader = _Reader(model, muscles, start, table)
     reader.check_widths()
@@ -121,7 +123,8 @@ class _Reader:
         self.found: dict[str, set[int]] = {kind: set() for kind in self.arrays}
         self.unused: list[str] = []
         self._muscles = set(muscles.names)
-        self._hinges = {n for n, j in single_joints(model).items() if int(model.jnt_type[j]) == _HINGE}
+        self._joints = single_joints(model)
+        self._hinges = {n for n, j in self._joints.items() if int(model.jnt_type[j]) == _HINGE}
         # by muscle: the array and the index in it
         self._places: dict[str, dict[str, tuple[str, int]]] = {"activation": {}, "fiber_length": {}}
         self._of_muscles: set[int] = set()  # indices in act
@@ -152,6 +155,9 @@ class _Reader:
         for kind, place, turns in self._readings(column):
             values = self.table[column]
             self.arrays[kind][:, place] = np.radians(values) if turns and self.table.in_degrees else values
+            if kind == "qpos" and turns:
+                joint = self._joints[self.names[kind][place]]
+                check_column(self.model, joint, self.table, column, own=column.startswith("qpos"))
             self.found[kind].add(place)
             return
         self.unused.append(column)
@@ -160,12 +166,13 @@ class _Reader:
         """Yield the possible places of a column, best first: array, index in it, whether it is a rotation."""
         for kind, names in self.names.items():
             if column.startswith(f"{kind}:") and column.removeprefix(f"{kind}:") in names:
-                yield kind, names.index(column.removeprefix(f"{kind}:")), False
+                name = column.removeprefix(f"{kind}:")
+                yield kind, names.index(name), self._turns(kind, name)
             number = column.removeprefix(f"{kind}[").removesuffix("]")
             if column == f"{kind}[{number}]" and number.isdigit() and int(number) < len(names):
-                yield kind, int(number), False
+                yield kind, int(number), self._turns(kind, names[int(number)])
             if column == kind and len(names) == 1:
-                yield kind, 0, False
+                yield kind, 0, self._turns(kind, names[0])
         for kind, places in self._places.items():
             muscle = column.removeprefix(f"{kind}:").removesuffix(f"/{kind}").removesuffix(f".{kind}")
             if muscle != column and muscle.rpartition("/")[2] in places:
@@ -174,6 +181,10 @@ class _Reader:
             joint = column.removesuffix(ending).rpartition("/")[2]
             if column.endswith(ending) and ":" not in column and joint in self.names[kind]:
                 yield kind, self.names[kind].index(joint), joint in self._hinges
+
+    def _turns(self, kind: str, name: str) -> bool:
+        """Return whether a value of a kind, of a joint, actuator or control, is an angle or a rate of one."""
+        return kind in ("qpos", "qvel") and name in self._hinges
 
     def states(self) -> States:
         """Return the states; velocities that are missing are computed as differences."""

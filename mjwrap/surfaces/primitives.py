@@ -15,6 +15,7 @@ import numpy as np
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.surfaces.surface import Array, Surface, axes, positive
+from mjwrap.validation import is_number
 
 FLATTEST_CONE = (
     1e-3  # smallest slope: a cone that is closer to a cylinder is inaccurate because of its far apex
@@ -284,8 +285,9 @@ class Cone(Surface):
 
     def __post_init__(self) -> None:
         for name in ("bottom_radius", "top_radius"):
-            if getattr(self, name) != 0.0:
-                positive(self, name, getattr(self, name))
+            value = getattr(self, name)
+            if not is_number(value) or value != 0.0:
+                positive(self, name, value)
         positive(self, "half_length", self.half_length)
         if abs(self.dims[1]) < FLATTEST_CONE:
             raise GeometryError(

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import validation
+from mjwrap import html, validation
 from mjwrap.errors import GeometryError
 
 Array = NDArray[np.float64]
@@ -75,6 +75,18 @@ class Surface:
 
     # ---------------------------------------------------------------------------------------------- pictures
 
+    def _repr_html_(self) -> str:
+        """Return the surface as a notebook shows it: its sizes, and its outline seen along x, z upwards."""
+        try:
+            radii, height = self.profile(33, None)
+        except GeometryError:
+            return html.facts([("surface", repr(self))])
+        wide = self.stretch[1] * radii
+        sides = [list(zip((sign * wide).tolist(), height.tolist(), strict=True)) for sign in (1.0, -1.0)]
+        closed = bool(np.allclose((radii[0], height[0]), (radii[-1], height[-1])))  # a torus
+        ends = [] if closed else [[sides[0][k], sides[1][k]] for k in (0, -1)]
+        return html.facts([("surface", repr(self))]) + html.drawing([], (), [*sides, *ends])
+
     def profile(self, count: int, half_length: float | None) -> tuple[Array, Array]:
         """Return radii and heights (count,) [m] of circles about local z with which the surface is drawn.
 
@@ -96,7 +108,7 @@ def positive(surface: Surface, name: str, value: Any, unbounded: bool = False) -
 def axes(surface: Surface, name: str, value: Any, count: int) -> None:
     """Store `count` positive sizes as a tuple of floats; `GeometryError` for anything else."""
     try:
-        values = tuple(value)
+        values = () if isinstance(value, str | bytes) else tuple(value)
     except TypeError:
         values = ()
     if len(values) != count:

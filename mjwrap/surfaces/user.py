@@ -100,13 +100,14 @@ class ParametricSurface(CustomSurface):
         size: float | None = None,
         name: str | None = None,
     ) -> None:
+        validation.optional(name, str, "ParametricSurface: name", GeometryError, "a text")
         label = f"ParametricSurface {name or getattr(r, '__name__', 'r')}"
         u_low, u_high = _range(label, "u_range", u_range)
         v_low, v_high = _range(label, "v_range", v_range)
         closed = (None, None) if periodic is None else periodic
         if not isinstance(closed, Sequence) or len(closed) != 2 or not {*closed} <= {None, True, False}:
             raise GeometryError(f"{label}: periodic must be two of True, False, None, not {periodic!r}")
-        if outward not in (None, 1, -1):
+        if outward is not None and not (isinstance(outward, int) and outward in (1, -1)):
             raise GeometryError(f"{label}: outward must be 1, -1 or None, not {outward!r}")
         chart = Chart((u_low, v_low), (u_high, v_high), (closed[0], closed[1]), outward)
         self._set(build.parametric_module(label, r, derivatives, chart, _size(label, size)))
@@ -142,6 +143,7 @@ class ImplicitSurface(CustomSurface):
         size: float | None = None,
         name: str | None = None,
     ) -> None:
+        validation.optional(name, str, "ImplicitSurface: name", GeometryError, "a text")
         label = f"ImplicitSurface {name or getattr(phi, '__name__', 'phi')}"
         if hessian is not None and gradient is None:
             raise GeometryError(f"{label}: hessian needs gradient too")
@@ -157,7 +159,7 @@ class ImplicitSurface(CustomSurface):
 
 def _range(label: str, name: str, value: Sequence[float]) -> tuple[float, float]:
     try:
-        low, high = (float(end) for end in value)
+        low, high = (float(end) for end in (() if isinstance(value, str | bytes) else value))
         good = math.isfinite(low) and math.isfinite(high) and low < high
     except (TypeError, ValueError):
         low = high = 0.0

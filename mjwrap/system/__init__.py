@@ -1,5 +1,6 @@
 """`MuscleSystem`: drives the muscles of a model; the only package that reads and writes mjData."""
 
+from mjwrap.system.cables import CableSystem, is_cable, twin_of
 from mjwrap.system.muscle_system import MuscleSystem
 
-__all__ = ["MuscleSystem"]
+__all__ = ["CableSystem", "MuscleSystem", "is_cable", "twin_of"]

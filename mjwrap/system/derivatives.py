@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError, PathError, StateError
 from mjwrap.kernels.coupling import jacobian_rate, muscle_paths
 from mjwrap.kernels.solved import hessian
@@ -25,7 +26,7 @@ def length_jacobian_rate(muscles: Results, state: State, direction: ArrayLike | 
             f"muscle '{muscles.names[i]}' has no path, so its derivatives do not exist: {muscles.reason(int(i))}"
         )
     if direction is not None:
-        given = np.asarray(direction, dtype=np.float64)
+        given = validation.numbers(direction, "direction", StateError)
         if given.shape != (model.nv,) or not np.isfinite(given).all():
             raise StateError(f"direction must be finite and have shape ({model.nv},), not {given.shape}")
         scratch.qvel[:] = given

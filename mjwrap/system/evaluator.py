@@ -8,11 +8,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mjwrap import validation
 from mjwrap.errors import ModelError, PathError, StateError
 from mjwrap.kernels.coupling import finite_checks, from_python
-from mjwrap.mjcf import has_plugin, read_declarations
+from mjwrap.mjcf import Declarations, has_plugin, read_declarations
 from mjwrap.model.arrays import build_plan
 from mjwrap.model.takeover import Takeover
+from mjwrap.muscles.laws import ActuatorForce
 from mjwrap.paths import Status
 from mjwrap.system.checks import check_state, ends_inside
 from mjwrap.system.results import Array, Results
@@ -29,9 +31,8 @@ class Evaluator(Results):
 
     def __init__(self, model: mujoco.MjModel, *, strict: bool = False, side_rule: int | None = None) -> None:
         if not isinstance(model, mujoco.MjModel):
-            raise ModelError(
-                f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}"
-            )
+            validation.of_type(model, "MjModel", "model", ModelError)
+        validation.flag(strict, "strict", ModelError)
         if has_plugin(model):
             raise ModelError(
                 "the engine plugin already drives the muscles of this model (install): mj_step moves it, and "
@@ -40,15 +41,25 @@ class Evaluator(Results):
         self.strict = strict
         self._takeover = Takeover(model)
         with self._takeover.original_limits():
-            found = read_declarations(model, side_rule=side_rule)
+            found = self._declarations(model, side_rule)
         plan = build_plan(model, found.muscles)
         super().__init__(found, plan, model, State(model, plan))
-        self._takeover.disable([muscle.actuator for muscle in found.muscles if muscle.actuator >= 0])
+        self._takeover.disable(
+            [
+                muscle.actuator
+                for muscle in found.muscles
+                if muscle.actuator >= 0 and not isinstance(muscle.parameters, ActuatorForce)
+            ]
+        )
         self._states: dict[int, State] = {}
         self._groups_off = 0
         self._off: NDArray[np.bool_] = np.zeros(plan.n, dtype=np.bool_)
         self._routes, self._muscles = plan.route_group(), plan.muscle_group(self._off)
         self._excitation: Array = np.zeros(self._plan.n)
+
+    def _declarations(self, model: mujoco.MjModel, side_rule: int | None) -> Declarations:
+        """Return the muscles to drive."""
+        return read_declarations(model, side_rule=side_rule)
 
     @property
     def excitation(self) -> Array:
@@ -57,7 +68,7 @@ class Evaluator(Results):
 
     @excitation.setter
     def excitation(self, values: ArrayLike) -> None:
-        given = np.asarray(values, dtype=np.float64)
+        given = validation.numbers(values, "excitation", StateError)
         if given.shape != self._excitation.shape:
             wanted = self._excitation.shape
             raise StateError(f"excitation must have shape {wanted}, one for each muscle, not {given.shape}")
@@ -69,7 +80,7 @@ class Evaluator(Results):
                 "this MuscleSystem has released its actuators to MuJoCo; build a new MuscleSystem to go on"
             )
         if not isinstance(data, mujoco.MjData):
-            raise StateError(f"expected an MjData, not {type(data).__name__}")
+            validation.of_type(data, "MjData", "data", StateError)
         if data.model._address != self.model._address:
             raise StateError("this MjData belongs to a different model than this MuscleSystem")
         key = id(data)

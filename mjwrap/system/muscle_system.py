@@ -6,22 +6,25 @@ between MuJoCo's position and acceleration stages, and under RK4 in a control ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import from_python, wrenches
 from mjwrap.kernels.musculotendon import dynamics
 from mjwrap.kernels.musculotendon.dispatch import PATH_ACTUATOR
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
+from mjwrap.muscles.fibers import FiberState, fiber_state
 from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
 from mjwrap.system.derivatives import length_jacobian_rate
 from mjwrap.system.evaluator import Evaluator
+from mjwrap.system.moment_arms import independent_coordinates, moment_arms
 from mjwrap.system.results import Array
 from mjwrap.system.state import State
 
@@ -116,6 +119,35 @@ class MuscleSystem(Evaluator):
         )  # fmt: skip
         return jacobian
 
+    @property
+    def coordinates(self) -> list[str]:
+        """Names of the independent hinges and slides, in the model's order: the columns of `moment_arms`.
+
+        A joint that follows another by an equality of the model (`<equality><joint polycoef>`) is not independent.
+        """
+        return independent_coordinates(self.model)
+
+    def moment_arms(self, data: mujoco.MjData, coordinates: Iterable[str] | None = None) -> Array:
+        """Return moment arms (n, k) about independent joints at the present qpos [m], about a slide [-].
+
+        Joints that follow a coordinate by an equality of the model move with it, so a column is the negative slope of
+        the lengths along the coupled motion: −J N, with J = ∂l/∂q of `length_jacobian`, which is called first, and
+        N = ∂q/∂q_independent. The equalities are those that are active at the model's start; followers are taken where
+        qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the muscle's pull drives the coordinate up.
+        A muscle without a path has the moment arms of its last valid path, 0 before it had one.
+
+        Args:
+            data: the state; only poses are used.
+            coordinates: a joint's name, or several, whose columns are returned in this order; by default all of the
+                property `coordinates`. A ball joint has three columns (rotations about the axes of its body), a free
+                joint six (translations in the world, then rotations about the body's axes), as in qvel; they are
+                returned only if they are named.
+
+        Raises:
+            GeometryError: no such joint, or it follows another one.
+        """
+        return moment_arms(self.model, self.length_jacobian(data), data.qpos, coordinates)
+
     def length_jacobian_rate(self, data: mujoco.MjData, direction: ArrayLike | None = None) -> Array:
         """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), by default along qvel.
 
@@ -146,6 +178,16 @@ class MuscleSystem(Evaluator):
             state.start.drive, state.length, np.where(idle, 0.0, state.velocity), state.fiber, constants,
         )  # fmt: skip
 
+    def fiber_state(self) -> FiberState:
+        """Return lengths, angles and forces of all fibres and tendons at the last evaluation.
+
+        After `step` and `apply` with an elastic tendon they belong to the state at the start of the step. Raises
+        `StateError` before the first evaluation.
+        """
+        plan, state, speed = self._plan, self._last, self.energetics().fiber_velocity
+        given = state.activation, state.length, state.velocity, state.fiber
+        return fiber_state(plan.law, plan.params, *given, speed)
+
     # -------------------------------------------------------------------------------------- stepping
 
     def step(self, data: mujoco.MjData, nstep: int = 1) -> None:
@@ -154,8 +196,8 @@ class MuscleSystem(Evaluator):
         Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds only the forces of other code.
         Raises `StateError` if the state is not finite, or if MuJoCo resets it because the motion became unstable.
         """
-        if nstep < 0:
-            raise StateError(f"nstep must not be negative, got {nstep}")
+        if not (isinstance(nstep, int | np.integer) and nstep >= 0):
+            raise StateError(f"nstep must be a whole number, not negative, got {validation.described(nstep)}")
         state = self._state(data)
         before = resets(data)
         runge_kutta = int(self.model.opt.integrator) == _RK4
@@ -252,7 +294,8 @@ class MuscleSystem(Evaluator):
     def set_branch(self, data: mujoco.MjData, branch: ArrayLike) -> None:
         """Restore what `branch` returned, also for another MjData of the model; else `StateError`."""
         state = self._state(data)
-        given, rows = np.asarray(branch, dtype=np.float64), state.node[:, layout.S_MODE :][:, : layout.STATE]
+        given = validation.numbers(branch, "branch", StateError)
+        rows = state.node[:, layout.S_MODE :][:, : layout.STATE]
         if given.shape != (rows.size + state.own.size,):
             raise StateError(
                 f"branch must have shape ({rows.size + state.own.size},) as branch() returns it, not {given.shape}"

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import difflib
+import operator
+from collections.abc import Iterator
+from typing import Any, SupportsIndex
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap import validation
+from mjwrap import plots, validation
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import drawn_paths, muscle_paths
 from mjwrap.kernels.solved import segments
 from mjwrap.kernels.spans import end_inside, hinted_sides
 from mjwrap.mjcf import Declarations, MuscleDeclaration
-from mjwrap.mjcf.names import name_of
+from mjwrap.mjcf.names import listed, name_of
 from mjwrap.model.arrays import Plan
 from mjwrap.model.kinematic_tree import last_dofs
 from mjwrap.paths import Status
 from mjwrap.system.history import History
+from mjwrap.system.muscle_view import MuscleView, system_html, system_text
 from mjwrap.system.state import Evaluation
 
 Array = NDArray[np.float64]
@@ -159,12 +165,49 @@ class Results:
 
     def index(self, name: str) -> int:
         """Return the index of a muscle by name; `GeometryError`, which lists the names, if there is no such muscle."""
-        if name not in self.names:
-            raise GeometryError(f"no muscle '{name}'; muscles: {', '.join(self.names) or 'none'}")
-        return self.names.index(name)
+        names = self.names
+        if not isinstance(name, str):
+            raise GeometryError(
+                f"no muscle of the name {validation.described(name)}; muscles: {listed(names)}"
+            )
+        if name not in names:
+            near = difflib.get_close_matches(name, names, n=3)
+            meant = f"did you mean {' or '.join(near)}? " if near else ""
+            raise GeometryError(f"no muscle '{name}'; {meant}muscles: {listed(names)}")
+        return names.index(name)
+
+    def __getitem__(self, muscle: str | SupportsIndex) -> MuscleView:
+        """Return a view of one muscle, by name or number; `GeometryError`, with near names, if there is none."""
+        if isinstance(muscle, str):
+            return MuscleView(self, self.index(muscle))
+        place = operator.index(muscle)
+        return MuscleView(self, self._known(place + self.n if -self.n <= place < 0 else place))
+
+    def __iter__(self) -> Iterator[MuscleView]:
+        """Yield a view of every muscle, in the order of all arrays."""
+        return (MuscleView(self, i) for i in range(self.n))
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a muscle of this name."""
+        return name in self.names
+
+    def __len__(self) -> int:
+        """Return the number of muscles."""
+        return self.n
+
+    def __bool__(self) -> bool:
+        """Return True, also without muscles: `if muscles` asks whether there is a system."""
+        return True
+
+    def __repr__(self) -> str:
+        return system_text(self)
+
+    def _repr_html_(self) -> str:
+        return system_html(self)
 
     def reason(self, i: int) -> str:
         """Return why muscle i last had no path, naming the elements; empty if it always had one."""
+        i = self._known(i)
         code = int(self._evaluation().last_failure[i])
         detail = self._evaluation().details[i]
         return (Status(code).message + (f" ({detail})" if detail else "")) if code else ""
@@ -181,9 +224,10 @@ class Results:
         return "\n".join(lines)
 
     def _known(self, i: int) -> int:
-        if not 0 <= i < self.n:
+        if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
             raise GeometryError(
-                f"muscle {i} does not exist; there are {self.n}: {', '.join(self.names) or 'none'}"
+                f"i: muscle {validation.described(i)} does not exist; "
+                f"there are {self.n}: {', '.join(self.names) or 'none'}"
             )
         return int(i)
 
@@ -219,6 +263,14 @@ class Results:
         A row of NaN separates routes of a muscle that pulleys join.
         """
         return self._polylines(spacing, -1)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw all paths at the last evaluation in space with matplotlib, and return the axes.
+
+        axes: 3D axes to draw into; None for a new figure. Raises `MissingPackageError` without matplotlib.
+        """
+        paths = [(name, self.points(i)) for i, name in enumerate(self.names)]
+        return plots.draw_paths(paths, self.contacts()[0], [], axes)
 
     def contact_points(self, i: int) -> Array:
         """Return the first and last contact point (k, 2, 3) of every obstacle that muscle i touches, world [m]."""

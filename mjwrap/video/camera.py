@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError
 
 MUSCLES = (
@@ -24,6 +26,8 @@ def find_camera(
     mujoco.mjv_defaultFreeCamera(model, found)
     if camera is None:
         return found
+    wanted = "a camera's name or id, a mujoco.MjvCamera, or None"
+    validation.instance(camera, str | int | np.integer, "camera", RecordingError, wanted)
     names = [model.camera(i).name for i in range(model.ncam)]
     number = names.index(camera) if isinstance(camera, str) and camera in names else camera
     if number == MUSCLES:
@@ -41,11 +45,8 @@ def look_at_muscles(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCam
     """
     found = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, found)
-    on_tendons = model.wrap_objid[model.wrap_type == int(mujoco.mjtWrap.mjWRAP_SITE)]
-    in_tuples = model.tuple_objid[model.tuple_objtype == int(mujoco.mjtObj.mjOBJ_SITE)]
-    sites = np.union1d(on_tendons, in_tuples)
-    points = data.site_xpos[sites]
-    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    points = muscle_points(model, data)
+    size = extent(points)
     if size == 0.0:
         return found
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -56,3 +57,16 @@ def look_at_muscles(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjvCam
     found.lookat[:], found.distance = middle, ROOM * size
     found.azimuth, found.elevation = float(np.degrees(np.arctan2(along[1], along[0]))), ELEVATION
     return found
+
+
+def muscle_points(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
+    """Return the places (n, 3) of all sites of tendons and tuples [m]."""
+    on_tendons = model.wrap_objid[model.wrap_type == int(mujoco.mjtWrap.mjWRAP_SITE)]
+    in_tuples = model.tuple_objid[model.tuple_objtype == int(mujoco.mjtObj.mjOBJ_SITE)]
+    sites = np.union1d(on_tendons, in_tuples)
+    return data.site_xpos[sites]
+
+
+def extent(points: NDArray[np.float64]) -> float:
+    """Return the diagonal of the box around points (n, 3) [m]; 0 if there are none."""
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0

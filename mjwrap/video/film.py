@@ -7,12 +7,15 @@ import math
 import os
 
 import mujoco
+import numpy as np
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
 from mjwrap.video.camera import find_camera, look_at_muscles
-from mjwrap.video.formats import FORMATS, Writer
+from mjwrap.video.formats import FORMATS, Picture, Writer
+from mjwrap.video.look import FilmLook
 from mjwrap.video.offscreen import Offscreen
 
 EARLY = 1e-6  # share of a frame's period by which it may be early, because times are rounded
@@ -35,6 +38,13 @@ class Video(RunLog):
         camera: name or id of a camera of the model, "muscles" for a camera that looks at all muscles when the film
             begins, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model.
         option: a mujoco.MjvOption, which selects what is shown.
+        background: "light", "dark", a colour "#RRGGBB", or "model" for the model's own sky and scenery. With a colour,
+            planes lose their texture, and meshes of the world around the muscles or apart from them are left out.
+        colors: of the muscles: "muscle" for one each, "activation" from blue at 0 to red at 1, "model" for MuJoCo's
+            rules; None for "muscle" if the model gives several muscles all the same look, else "model".
+        surfaces: True shows every wrapping surface, translucent; False none; None those that the model shows.
+        legend: names beside their colours; None for a legend if colours tell at most 12 muscles apart.
+        shadows: draw shadows, which without a graphics card takes several times as long.
 
     Raises:
         RecordingError: before the run, if no OpenGL works, the file cannot be written, or the package that writes it
@@ -52,15 +62,22 @@ class Video(RunLog):
         height: int = 480,
         camera: str | int | mujoco.MjvCamera | None = None,
         option: mujoco.MjvOption | None = None,
+        background: str = "light",
+        colors: str | None = None,
+        surfaces: bool | None = None,
+        legend: bool | None = None,
+        shadows: bool = False,
     ) -> None:
+        validation.of_type(model, "MjModel", "model", RecordingError)
+        validation.optional(option, mujoco.MjvOption, "option", RecordingError, "a mujoco.MjvOption")
         require("fps", fps, is_positive(fps), "a positive number of frames per second")
         require("speed", speed, is_positive(speed), "a positive number of simulated seconds per second")
         for name, pixels in (("width", width), ("height", height)):
-            require(
-                name, pixels, int(pixels) == pixels and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384"
-            )
+            good = isinstance(pixels, int | float | np.integer) and pixels == pixels // 1
+            require(name, pixels, good and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384")
         self._model, self._camera = model, find_camera(model, camera)
         self._option = option or mujoco.MjvOption()
+        self._look = FilmLook(background, colors, surfaces, legend, int(width), int(height))
         self._signature = model.signature
         self._rate = fps / speed  # frames per simulated second
         self._start: float | None = None  # time of the first frame
@@ -71,7 +88,7 @@ class Video(RunLog):
             undo.callback(target.discard)
             self._writer: Writer = FORMATS[target.path.suffix.lower()](target.part, fps, *size)
             undo.callback(self._writer.abandon)
-            self._canvas = Offscreen(model, *size)
+            self._canvas = Offscreen(model, *size, shadows=shadows)
             undo.pop_all()
         release = contextlib.ExitStack()
         release.callback(self._canvas.close)
@@ -101,7 +118,11 @@ class Video(RunLog):
         if number > self._number:
             self._number = number
             camera = self._camera = self._camera or look_at_muscles(self._model, data)
-            self._guarded(lambda: self._writer.add(self._canvas.picture(data, camera, self._option), number))
+            self._guarded(lambda: self._writer.add(self._picture(data, camera), number))
+
+    def _picture(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> Picture:
+        dress = self._look.dress(data)
+        return self._look.finish(self._canvas.picture(data, camera, self._option, dress))
 
     @property
     def _empty(self) -> bool:

@@ -43,7 +43,8 @@ class Mp4:
             av: Any = importlib.import_module("av")
         except ImportError as error:
             raise RecordingError(
-                f"cannot write .mp4: {error}; install PyAV with: pip install 'mjwrap[video]', or write a .gif"
+                f"cannot write .mp4: {error}; install PyAV with: pip install 'mjwrap[video]', or pip install av; or "
+                "write a .gif"
             ) from error
         self._av = av
         fraction = Fraction(rate).limit_denominator(1000)
@@ -81,7 +82,7 @@ class Gif:
             image: Any = importlib.import_module("PIL.Image")
         except ImportError as error:
             raise RecordingError(
-                f"cannot write .gif: {error}; install Pillow with: pip install pillow"
+                f"cannot write .gif: {error}; install Pillow with: pip install 'mjwrap[video]', or pip install pillow"
             ) from error
         self._image = image
         self._part, self._rate = part, rate

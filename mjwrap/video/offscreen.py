@@ -7,7 +7,7 @@ import importlib
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
@@ -36,10 +36,11 @@ def _backends() -> Iterator[tuple[str, str]]:
 class Offscreen:
     """A canvas of a given size [pixels] for one model; `picture` must be called in the thread that made the canvas.
 
-    Raises RecordingError, with the error of each backend, if no OpenGL works.
+    shadows: draw them, which on a processor takes several times as long. Raises RecordingError, with the error of each
+    backend, if no OpenGL works.
     """
 
-    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+    def __init__(self, model: mujoco.MjModel, width: int, height: int, *, shadows: bool = True) -> None:
         self._model, self._rect = model, mujoco.MjrRect(0, 0, width, height)
         faults = []
         for name, module in _backends():
@@ -56,7 +57,9 @@ class Offscreen:
                 f"{_CHOICE}=egl (a graphics card's driver, or Mesa's libEGL) or {_CHOICE}=osmesa (libOSMesa) before "
                 f"mujoco is imported"
             )
+        self._dressed = False
         self._scene = mujoco.MjvScene(model, MAXGEOM)
+        self._scene.flags[int(mujoco.mjtRndFlag.mjRND_SHADOW)] = shadows
 
     def _open(self, backend: Any, width: int, height: int) -> None:
         if not hasattr(backend, "GLContext"):
@@ -75,12 +78,24 @@ class Offscreen:
         self._renderer = renderer
 
     def picture(
-        self, data: mujoco.MjData, camera: mujoco.MjvCamera, option: mujoco.MjvOption
+        self,
+        data: mujoco.MjData,
+        camera: mujoco.MjvCamera,
+        option: mujoco.MjvOption,
+        dress: Callable[[mujoco.MjvScene, mujoco.MjrContext], object] | None = None,
     ) -> NDArray[np.uint8]:
-        """Return the picture of a state, (height, width, 3), red, green and blue from the upper left on."""
+        """Return the picture of a state, (height, width, 3), red, green and blue from the upper left on.
+
+        dress: changes the scene, and the context that draws it, after MuJoCo has filled the scene.
+        """
         self._context.make_current()
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self._model, data, option, None, camera, every, self._scene)
+        if dress is not None:
+            dress(self._scene, self._renderer)
+            if not self._dressed:  # MuJoCo draws its first scene with the fog that the context was made with
+                self._dressed = True
+                mujoco.mjr_render(mujoco.MjrRect(0, 0, 1, 1), self._scene, self._renderer)
         mujoco.mjr_render(self._rect, self._scene, self._renderer)
         pixels = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._renderer)

@@ -11,7 +11,7 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.common.recorded import LOCAL, RecordingSettings
 from mjwrap.errors import TableError
 
-MODEL_HELP = "MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package"
+MODEL_HELP = "MJCF or MJB file, mjwrap:NAME (comes with mjwrap), or myo_sim:NAME (myo-sim package)"
 INITIAL_POSE = "qpos0, the model's initial pose"
 RECORDING_DETAILS = (
     "rate",
@@ -38,6 +38,13 @@ def add_side_rule(parser: Any) -> None:
         metavar="3|4",
         help="whose rule picks, at the reference pose, the way round a cylinder that the side site of a tendon means: "
         "that of MuJoCo 3 or 4 (default: the running MuJoCo's, or the one that an installed model has stored)",
+    )
+
+
+def add_tendons(parser: Any, what: str) -> None:
+    """Add the option --tendons; what: the verb of the command."""
+    parser.add_argument(
+        "--tendons", action="store_true", help=f"{what} spatial tendons without an actuator, too"
     )
 
 
@@ -104,13 +111,50 @@ def number(text: str, where: str) -> float:
     return value
 
 
+def joint_position(text: str, where: str) -> float:
+    """Return a finite position [rad or m], in rad also of "90deg"; else a `UserError` that begins with `where`."""
+    from mjwrap.runs.angles import position  # with MuJoCo, which --help does not need
+
+    try:
+        value = position(text)
+    except ValueError:
+        raise UserError(f"{where}: {text!r} is not a number, or degrees such as 90deg") from None
+    if not math.isfinite(value):
+        raise UserError(f"{where}: {text} is not finite")
+    return value
+
+
+def positions(entries: Sequence[str], option: str) -> dict[str, float]:
+    """Return positions [rad or m] by joint from "JOINT=VALUE"; VALUE as for `joint_position`."""
+    found = {}
+    for entry in entries:
+        name, equals, text = entry.rpartition("=")
+        if not equals or not name:
+            raise UserError(
+                f"{option} '{entry}': write JOINT=VALUE, such as {entry or 'knee'}=0.5 [rad or m]"
+            )
+        found[name] = joint_position(text, f"'{entry}'")
+    return found
+
+
+def span(text: str, option: str) -> tuple[float, float]:
+    """Return two increasing positions [rad or m] from "LOW,HIGH", each as for `joint_position`."""
+    ends = text.split(",")
+    if len(ends) != 2:
+        raise UserError(f"{option} '{text}': write LOW,HIGH, such as 0,1.57 or 0deg,90deg")
+    low, high = (joint_position(end, f"{option} '{text}'") for end in ends)
+    if not high > low:
+        raise UserError(f"{option} '{text}': the second number must be larger")
+    return low, high
+
+
 def add_analysis(add: Callable[..., object]) -> None:
     """Add the option --analysis; add: the add_argument of a parser or group."""
     add(
         "--analysis",
         metavar="PREFIX",
-        help="write lengths, fibre lengths, tensions and moment arms to files named as by OpenSim's MuscleAnalysis: "
-        "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto",
+        help="write lengths, moment arms, fibres, forces, powers and metabolic power to files named as by OpenSim: "
+        "PREFIX_MuscleAnalysis_Length.sto, ..._MomentArm_JOINT.sto, PREFIX_ProbeReporter_probes.sto",
     )
 
 

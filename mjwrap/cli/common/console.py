@@ -22,7 +22,16 @@ _MYO_NOISE = (
     "Attaching a spec with an empty prefix"  # raised by myo_sim's models; matters only when they are saved
 )
 
-INPUTS = ("model", "file", "excitation", "prescribe", "states", "lengths", "moment_arms")  # name what is read
+INPUTS = (
+    "model",
+    "file",
+    "excitation",
+    "prescribe",
+    "states",
+    "lengths",
+    "moment_arms",
+    "data",
+)  # name what is read
 
 
 class _Help(argparse.HelpFormatter):
@@ -60,7 +69,7 @@ class Parser(argparse.ArgumentParser):
         optional = {f: a.const for a in self._actions if a.nargs == "?" for f in a.option_strings}
         for i, (word, following) in enumerate(itertools.pairwise(given)):
             if word in optional and (
-                following.lower().endswith(_SUFFIXES) or following.startswith("myo_sim:")
+                following.lower().endswith(_SUFFIXES) or following.startswith(("mjwrap:", "myo_sim:"))
             ):
                 given[i] = f"{word}={optional[word]}"
         return super().parse_args(given, namespace)

@@ -8,12 +8,14 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.files.atomic import PartFile
 
 
-def need_matplotlib() -> None:
-    """Raise `UserError` if matplotlib is not installed: called before the run."""
+def need_matplotlib(option: str = "--plot") -> None:
+    """Raise `UserError` if matplotlib is not installed: called before the run. option: what needs it."""
     try:
         import matplotlib
     except ImportError:
-        raise UserError("--plot needs matplotlib: pip install 'mjwrap[demo]'") from None
+        raise UserError(
+            f"{option} needs matplotlib: pip install 'mjwrap[demo]', or pip install matplotlib"
+        ) from None
     matplotlib.use("Agg")
     # names of models are text, whatever they contain: no formulas between dollars, no TeX
     matplotlib.rcParams.update({"text.parse_math": False, "text.usetex": False})

@@ -1,6 +1,6 @@
 """Compare MuJoCo's built-in tendon wrapping with mjwrap's paths on the same model.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 Every joint is swept over its range, around the start pose and around further poses, and random poses are drawn. Each
 path is judged by its geometry: it must be straight or a geodesic on the surface, meet the surface tangentially, never
@@ -20,7 +20,7 @@ import argparse
 import shlex
 from collections.abc import Sequence
 
-from mjwrap.cli.common.arguments import add_json, add_model, at_least, not_negative
+from mjwrap.cli.common.arguments import add_json, add_model, add_tendons, at_least, not_negative
 from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.compare.comparing import CompareSettings, GivenTables, compare
 
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="compare only these muscles (* and ? match any characters)",
     )
+    add_tendons(parser, "compare")
     add(
         "--samples",
         type=at_least(3),
@@ -82,6 +83,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="JOINT=FILE",
         help="tables of moment arms about a joint along --states, such as OpenSim's",
     )
+    add(
+        "--data",
+        nargs="+",
+        default=[],
+        metavar="[QUANTITY=]FILE",
+        help="tables of lengths or moment arms over a joint's position, for --plot: drawn over both programs' curves, "
+        "as by mjwrap plot",
+    )
     add("--plot", metavar="FILE.png", help="plot the comparison (.png, .pdf, .svg)")
     add("--report", metavar="FILE.html", help="write a page with a table of all muscles, plots and verdicts")
     add("--csv", metavar="FILE.csv", help="write a row for every muscle and pose, without sweeps that "
@@ -102,6 +111,8 @@ def execute(options: argparse.Namespace) -> int:
 
 def settings(options: argparse.Namespace) -> CompareSettings:
     """Convert the arguments to settings; raises `UserError` if they contradict each other."""
+    if options.data and not options.plot:
+        raise UserError("--data needs a plot: add --plot")
     if options.csv_all and not options.csv:
         raise UserError("--csv-all needs a table: add --csv")
     return CompareSettings(
@@ -116,6 +127,7 @@ def settings(options: argparse.Namespace) -> CompareSettings:
         excitation=options.excitation,
         law=options.law,
         given=_given_tables(options.states, options.lengths, options.moment_arms),
+        data=options.data,
         plot=options.plot,
         page=options.report,
         csv=options.csv,
@@ -123,6 +135,7 @@ def settings(options: argparse.Namespace) -> CompareSettings:
         json=options.json,
         check=options.check,
         command=shlex.join(["mjwrap", "compare", *options.given]),
+        tendons=options.tendons,
     )
 
 

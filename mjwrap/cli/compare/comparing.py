@@ -17,6 +17,7 @@ from mjwrap.cli.common.figures import need_matplotlib
 from mjwrap.cli.common.output import Report, open_output
 from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import Stages
+from mjwrap.cli.compare.data_panels import data_panels
 from mjwrap.cli.compare.rows import PoseRows, write_tables
 from mjwrap.cli.compare.text import as_values, tell_motion, tell_poses, tell_tables
 from mjwrap.comparison import (
@@ -32,7 +33,8 @@ from mjwrap.mjcf import dof_names
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.runs.state_tables import read_states
-from mjwrap.text import counted
+from mjwrap.system import CableSystem
+from mjwrap.text import counted, counted_paths
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,13 @@ class GivenTables:
 class CompareSettings:
     """The settings of `mjwrap compare`.
 
-    model: a file, or "myo_sim:NAME". keyframe: the start pose, None for qpos0. side_rule: of mjwrap's paths, as for
+    model: a file or a model by name. keyframe: the start pose, None for qpos0. side_rule: of mjwrap's paths, as for
     `MuscleSystem`. muscles: patterns of names, None for all. samples: number of poses along a sweep, and of random
     poses. bases: number of further poses to sweep around. duration: of the simulation [s], 0 for none. excitation: as
     `Excitation` takes it. law: "mujoco" simulates both with MuJoCo's curves, "declared" mjwrap with the declared law.
-    plot, page, csv, json: files, or None; json may be "-" for standard output. csv_all: write every row to csv. check:
-    exit code 1 if a path of mjwrap is wrong. command: the command line of this comparison.
+    data: tables over a joint's position, for the plot. plot, page, csv, json: files, or None; json may be "-" for
+    standard output. csv_all: write every row to csv. check: exit code 1 if a path of mjwrap is wrong. command: the
+    command line of this comparison. tendons: compare tendons without an actuator, too.
     """
 
     model: str
@@ -67,6 +70,7 @@ class CompareSettings:
     excitation: Sequence[str]
     law: str
     given: GivenTables | None
+    data: Sequence[str]
     plot: str | None
     page: str | None
     csv: str | None
@@ -74,6 +78,7 @@ class CompareSettings:
     json: str | None
     check: bool
     command: str
+    tendons: bool = False
 
 
 def compare(settings: CompareSettings) -> int:
@@ -81,7 +86,7 @@ def compare(settings: CompareSettings) -> int:
     model = load(settings.model)
     key = start_keyframe(model, settings.keyframe)
     start = start_state(model, key)
-    muscles = MuscleSystem(model, side_rule=settings.side_rule)
+    muscles = CableSystem(model, side_rule=settings.side_rule, tendons=settings.tendons)
     names = choose(muscles, settings.muscles)
     Excitation(muscles, settings.excitation, settings.seed)  # a mistake here is reported early
     plot = open_output(settings.plot, "--plot", ".png", ".pdf", ".svg") if settings.plot else None
@@ -90,7 +95,8 @@ def compare(settings: CompareSettings) -> int:
     report = Report(settings.json)
     given = read_tables(settings.given, model, muscles, start) if settings.given else None
     if plot is not None or page is not None:
-        need_matplotlib()
+        need_matplotlib("--plot" if plot is not None else "--report")
+    panels = data_panels(model, settings.data, start.qpos, settings.side_rule, report.say)
     columns: list[TableColumn] = []
     tables = (
         compare_tables(model, *given, side_rule=settings.side_rule, each=columns.append)
@@ -105,8 +111,10 @@ def compare(settings: CompareSettings) -> int:
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
         for name, summary in found.muscles.items()
     }
+    cables, bare = (len(found.muscles.keys() & set(group)) for group in (muscles.cables, muscles.bare))
+    paths = counted_paths(len(found.muscles), cables, bare)
     report.say(
-        f"{settings.model}: {counted(len(found.muscles), 'muscle')} at {counted(found.poses, 'pose')} each; MuJoCo "
+        f"{settings.model}: {paths} at {counted(found.poses, 'pose')} each; MuJoCo "
         f"{mujoco.__version__}, mjwrap with MuJoCo {found.side_rule}'s rule for side sites"
     )
     tell_poses(report.say, found, verdicts)
@@ -133,7 +141,7 @@ def compare(settings: CompareSettings) -> int:
         from mjwrap.cli.compare.plot import plot_comparison
 
         title = f"{Path(settings.model).name}: MuJoCo {mujoco.__version__} and mjwrap, {found.poses} poses"
-        outputs.attempt("plot", lambda: plot_comparison(plot, title, found, motion))
+        outputs.attempt("plot", lambda: plot_comparison(plot, title, found, motion, panels))
     if page is not None:
         from mjwrap.cli.compare.page import write_page
 
@@ -177,7 +185,7 @@ def compare_all(
         return compare_poses(
             model, names=names, samples=settings.samples, bases=settings.bases, seed=settings.seed,
             base=start.qpos, each=rows.add if rows is not None else None, side_rule=settings.side_rule,
-            progress=progress,
+            tendons=settings.tendons, progress=progress,
         )  # fmt: skip
 
 

@@ -183,8 +183,8 @@ def _motion(motion: MotionDifference) -> dict[str, str]:
     dof, gap, when = motion.worst()
     last, final = motion.final()
     told = (
-        f"Over {motion.time[-1]:g} s the largest difference of mjwrap from MuJoCo is {gap:+.3g} ({dof}, at {when:g} "
-        f"s); at the end it is {final:+.3g} ({last}) [rad, m]. {motion.stopped}"
+        f"Over {motion.time[-1]:g} s the largest difference of mjwrap from MuJoCo is {gap:+.3g} {motion.unit(dof)} "
+        f"({dof}, at {when:g} s); at the end it is {final:+.3g} {motion.unit(last)} ({last}). {motion.stopped}"
     )
     figure, pair = plt.subplots(1, 2, figsize=(10.0, 2.8), layout="constrained")
     draw_motion(pair, motion)

@@ -139,7 +139,9 @@ def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries:
         say(f"  {those} with another law: MuJoCo's curves in both (--law declared: their own law)")
     dof, gap, when = motion.worst()
     last, final = motion.final()
-    say(f"  largest difference {gap:+.3g} ({dof}, at {when:g} s); at the end {final:+.3g} ({last}) [rad, m]")
+    if dof:
+        say(f"  largest difference {gap:+.3g} {motion.unit(dof)} ({dof}, at {when:g} s)")
+        say(f"  at the end {final:+.3g} {motion.unit(last)} ({last})")
     if motion.stopped:
         say(f"  ended early: {motion.stopped}")
     if motion.paths:

@@ -1,6 +1,6 @@
 """List the muscles of a model, with laws and wrapping surfaces, and report implausible parameters.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 The list also names the actuators that stay with MuJoCo, and why. To judge the parameters, the joints are moved over
 their ranges, all together, to find the lengths that every muscle takes along its geodesic path. docs/parameters.md
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import argparse
 
-from mjwrap.cli.common.arguments import add_json, add_model, number
+from mjwrap.cli.common.arguments import add_json, add_model, joint_position
 from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.inspect.inspecting import InspectSettings, inspect
 
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="JOINT=LOW,HIGH",
-        help="ranges of joints, in place of the model's [rad, m]",
+        help="ranges of joints, in place of the model's [rad, m; 0deg,90deg]",
     )
     add(
         "--quick",
@@ -69,5 +69,5 @@ def _read_range(entry: str) -> tuple[str, tuple[float, float]]:
     ends = text.split(",")
     if not name or len(ends) != 2:
         raise UserError(f"--range '{entry}': write JOINT=LOW,HIGH")
-    low, high = (number(end, f"--range '{entry}'") for end in ends)
+    low, high = (joint_position(end, f"--range '{entry}'") for end in ends)
     return name, (low, high)

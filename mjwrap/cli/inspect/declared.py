@@ -28,7 +28,7 @@ def table(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> str:
         unit = as_unit(muscle.parameters)
         sizes = [_size(unit.peak, 1.0), _size(unit.optimal, 1e3), _size(unit.slack, 1e3)]
         tendon = getattr(muscle.parameters, "tendon", "rigid" if muscle.law == "mujoco" else "")
-        path = " | ".join(_path(model, route) for route in muscle.routes)
+        path = " | ".join(path_text(model, route) for route in muscle.routes)
         rows.append((muscle.name, muscle.law, *sizes, tendon, path))
     return "\n".join(aligned(rows, _WORDS))
 
@@ -37,7 +37,8 @@ def _size(value: float, scale: float) -> str:
     return f"{scale * value:.4g}" if math.isfinite(value) else "-"
 
 
-def _path(model: mujoco.MjModel, route: Route) -> str:
+def path_text(model: mujoco.MjModel, route: Route) -> str:
+    """Return the sites and surfaces of a route in words."""
     stops = [_site(model, route.origin)]
     for is_via, group in itertools.groupby(route.nodes, lambda node: node.surface is None):
         nodes = list(group)

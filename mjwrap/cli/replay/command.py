@@ -74,6 +74,7 @@ def execute(options: argparse.Namespace) -> int:
 
 def settings(options: argparse.Namespace) -> ReplaySettings:
     """Convert the arguments to settings; raises `UserError` if they contradict each other."""
+    _refuse_models(options.file)
     is_table = Path(options.file).suffix.lower() in SUFFIXES
     for option in (
         ()
@@ -92,6 +93,21 @@ def settings(options: argparse.Namespace) -> ReplaySettings:
         info=options.info,
         json=options.json,
     )
+
+
+def _refuse_models(file: str) -> None:
+    """Raise `UserError`, which says what to do with it, if FILE is a model."""
+    name = file.lower()
+    if name.endswith(".osim"):
+        raise UserError(
+            f"'{file}' is a model of OpenSim, which mjwrap does not read yet; replay shows recordings (.rrd), and "
+            f"tables of states ({', '.join(SUFFIXES)}) of the MuJoCo model that --model names"
+        )
+    if name.endswith((".xml", ".mjb", ".urdf")) or name.startswith(("mjwrap:", "myo_sim:")):
+        raise UserError(
+            f"'{file}' is a model, not a recording or a table of states; to make a recording of it: mjwrap run {file} "
+            "--excitation pulses --record run.rrd"
+        )
 
 
 def _states(options: argparse.Namespace) -> StatesSettings:

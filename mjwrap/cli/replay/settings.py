@@ -12,7 +12,7 @@ from mjwrap.cli.common.recorded import RecordingSettings
 class StatesSettings:
     """The settings for a table of states.
 
-    model: a file, or "myo_sim:NAME". keyframe: gives the values that the table lacks, None for qpos0. side_rule: as for
+    model: a file or a model by name. keyframe: gives the values that the table lacks, None for qpos0. side_rule: as for
     `MuscleSystem`. table: a file for the quantities named in `kinds`, or None. analysis: the prefix of tables in
     OpenSim's layout, or None.
     """

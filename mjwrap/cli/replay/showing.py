@@ -38,8 +38,20 @@ def show(settings: ReplaySettings, path: str) -> int:
     if settings.serve or not has_display():
         with uninterrupted():
             server = serve(path, settings.port)
-        return serve_until_stopped(server, lambda: say(f"open {server.address}\npress Ctrl-C to stop"))
+        return serve_until_stopped(server, lambda: say(served(settings, summary, server.address)))
     return open_native(path)
+
+
+def served(settings: ReplaySettings, summary: Summary, address: str) -> str:
+    """Return what --serve has started, and where; the address is the last word."""
+    why = "" if settings.serve else "there is no display for rerun's viewer, so "
+    what = f"{summary.model}, {summary.start:g} s to {summary.end:g} s, {counted(summary.states, 'state')}"
+    return (
+        f"{why}rerun serves its viewer for a browser on this machine at port {settings.port}, and the recording "
+        f"({what}) at port {settings.port + 1}\n"
+        f"press Ctrl-C to stop it\n"
+        f"open {address}"
+    )
 
 
 def replay_states(settings: ReplaySettings, states: StatesSettings) -> int:

@@ -22,6 +22,7 @@ from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.runs.muscle_analysis_tables import MuscleAnalysisTables
 from mjwrap.runs.run_table import RunTableFile
 from mjwrap.runs.state_tables import read_states
+from mjwrap.system import CableSystem
 from mjwrap.text import counted
 
 
@@ -34,7 +35,7 @@ def recompute(
     """
     model = load(settings.model)
     data = start_state(model, start_keyframe(model, settings.keyframe))
-    muscles = MuscleSystem(model, side_rule=settings.side_rule)
+    muscles = CableSystem(model, side_rule=settings.side_rule)
     states = read_states(model, muscles, data, read_table(file))
     report = Report(json)
     failures = np.zeros(muscles.n, dtype=np.int64)

@@ -1,6 +1,6 @@
 """Simulate a model with its muscles along geodesic paths.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package.
+MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
 Excitation is PATTERN for all muscles, NAME=PATTERN for the muscles and actuators whose names match (* and ? match any
 characters), or a table (.csv, .sto, .mot, .npz) with a column 'time' and a column for each muscle or actuator that it
@@ -31,7 +31,7 @@ from mjwrap.cli.common.arguments import (
     add_model,
     add_recording,
     add_serving,
-    number,
+    joint_position,
     pixels,
     positive,
     read_kinds,
@@ -41,12 +41,13 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.run.run_files import FilmSettings, OutputSettings
 from mjwrap.cli.run.running import RunCommandSettings, run
 from mjwrap.files import SUFFIXES
-from mjwrap.runs.engine import MODES
+from mjwrap.runs.engine import MODES, film_mode
 from mjwrap.runs.models import INTEGRATORS
 from mjwrap.runs.run_table import DEFAULT_KINDS, KINDS
 from mjwrap.runs.simulation import RunSettings
 
 COLUMNS = ",".join(DEFAULT_KINDS)
+FILM_ONLY = ("camera", "background", "colors", "surfaces", "legend", "shadows")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--timestep", type=positive, metavar="S", help="time step (default: the model's)")
     add("--integrator", choices=INTEGRATORS, type=str.lower, help="integrator (default: the model's)")
     add("--mode", metavar="MODE", help="python: steps a MuscleSystem (default); wrench or "
-        "transmission: runs the engine plugin in this mode (default with --video: wrench)")  # fmt: skip
+        "transmission: runs the engine plugin in this mode (--video: wrench, for cables transmission)")  # fmt: skip
     add(
         "--excitation",
         **several,
@@ -66,8 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="excitation of muscles and other actuators: see above",
     )
     add("--prescribe", **several, metavar="JOINT=PATTERN|FILE", help="joints that follow a constant, sine or cosine "
-        "[rad, m] or the columns of a table, whatever forces act on them")  # fmt: skip
-    add("--qpos", **several, metavar="JOINT=VALUE", help="positions of joints at the start [rad, m]")
+        "[rad, m; 90deg] or the columns of a table, whatever forces act on them")  # fmt: skip
+    add("--qpos", **several, metavar="JOINT=VALUE", help="positions of joints at the start [rad, m; 90deg]")
     add("--strict", action="store_true", help="stop the run when the path of a muscle cannot be found")
     add("--sample", type=positive, default=0.005, metavar="S", help="time between samples of the outputs, "
         "rounded to whole time steps (default %(default)s s)")  # fmt: skip
@@ -98,6 +99,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="camera of the film: a camera of the model, or 'muscles', which looks at the muscles (default: a view of "
         "the whole model)",
     )
+    film("--background", metavar="COLOUR", default=None, help="behind the model: light (default), dark, '#RRGGBB', or "
+        "model, the model's own sky and scenery")  # fmt: skip
+    film("--colors", choices=("muscle", "activation", "model"), help="colours of the muscles: one for each muscle, by "
+        "activation, or the model's (default: one for each, if the model gives all the same)")  # fmt: skip
+    either = argparse.BooleanOptionalAction
+    film("--surfaces", action=either, default=None, help="show all wrapping surfaces, translucent, or none (default: "
+        "those that the model shows)")  # fmt: skip
+    film(
+        "--legend",
+        action=either,
+        default=None,
+        help="names beside their colours (default: for up to 12 muscles)",
+    )
+    film(
+        "--shadows", action="store_true", default=None, help="draw shadows, which takes several times as long"
+    )
     files = parser.add_argument_group("plot and tables").add_argument
     files(
         "--plot",
@@ -119,13 +136,14 @@ def execute(options: argparse.Namespace) -> int:
 
 def settings(options: argparse.Namespace) -> RunCommandSettings:
     """Convert the arguments to settings; raises `UserError` if they contradict each other."""
-    mode = options.mode or ("wrench" if options.video else MODES[0])
+    mode = options.mode or (film_mode(options.model) if options.video else MODES[0])
     if options.video and mode == MODES[0]:
         raise UserError("--video needs the engine plugin: leave --mode out, or write --mode wrench")
     if mode not in MODES:
         raise UserError(f"mode '{mode}' does not exist; modes: {', '.join(MODES)}")
-    if options.camera and not options.video:
-        raise UserError("--camera needs a film: add --video")
+    for name in FILM_ONLY:
+        if getattr(options, name) is not None and not options.video:
+            raise UserError(f"--{name} needs a film: add --video")
     if options.columns != COLUMNS and not (options.out or options.csv):
         raise UserError("--columns needs a table: add --out or --csv")
     places = (options.record, options.connect, options.serve)
@@ -160,7 +178,11 @@ def _film(options: argparse.Namespace) -> FilmSettings | None:
     if not options.video:
         return None
     width, height = options.video_size
-    return FilmSettings(options.video, width, height, options.fps, options.speed, options.camera)
+    return FilmSettings(
+        options.video, width, height, options.fps, options.speed, options.camera,
+        background=options.background or "light", colors=options.colors, surfaces=options.surfaces,
+        legend=options.legend, shadows=bool(options.shadows),
+    )  # fmt: skip
 
 
 def _positions(entries: Sequence[str]) -> dict[str, float]:
@@ -169,6 +191,8 @@ def _positions(entries: Sequence[str]) -> dict[str, float]:
     for entry in entries:
         name, equals, text = entry.rpartition("=")
         if not equals:
-            raise UserError(f"--qpos '{entry}': write JOINT=VALUE, such as {entry}=0.5 [rad or m]")
-        found[name] = number(text, f"'{entry}'")
+            raise UserError(
+                f"--qpos '{entry}': write JOINT=VALUE, such as {entry}=0.5 [rad or m] or {entry}=30deg"
+            )
+        found[name] = joint_position(text, f"'{entry}'")
     return found

@@ -15,10 +15,13 @@ from mjwrap.cli.common.figures import legend_label, save_figure
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import name_of
 from mjwrap.runs.plot_history import PlotHistory
+from mjwrap.system import CableSystem
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
 LINES = 12  # more curves than this in one panel cannot be distinguished
+NAME = 0.155  # height of a muscle's name [inches]
+QUANTITIES = ("activation", "length", "tension")
 _STYLES = ("-", "--", ":")
 
 
@@ -28,31 +31,52 @@ def plot_run(
     """Plot a run and write the file."""
     many = muscles.n > LINES
     turns, slides, left_out = _joints(model, history.column(1))
-    panels = [p for p in ("turns" if turns else "", "slides" if slides else "") if p]
-    panels += ["activation", "length", "tension"] if muscles.n else []
-    tall = max(2.6, 0.155 * muscles.n) if many else 2.3
-    heights = [2.3 if p in ("turns", "slides") else tall for p in panels] or [2.3]
-    figure, axes = plt.subplots(
-        len(heights), 1, sharex=True, squeeze=False, figsize=(11.0, sum(heights) + 0.9), layout="constrained",
-        gridspec_kw={"height_ratios": heights},
-    )  # fmt: skip
+    joints = [p for p in ("turns" if turns else "", "slides" if slides else "") if p]
+    figure, places = _panels(joints, list(QUANTITIES) if muscles.n else [], muscles.n)
     time = history.time
-    for axis, panel in zip(axes[:, 0], panels, strict=False):
+    for panel, axis in places.items():
         if panel == "turns":
             _lines(axis, time, {name: np.degrees(x) for name, x in turns.items()}, "joints [°]", many)
         elif panel == "slides":
             _lines(axis, time, {name: 1e3 * x for name, x in slides.items()}, "joints [mm]", many)
-        else:
+        elif panel in QUANTITIES:
             _muscle_panel(figure, axis, time, panel, muscles, history, many)
+        axis.set_xlim(time[0], max(time[-1], time[0] + 1e-9))
     notes = [f"left out: {counted(left_out, 'joint')} with less motion"] if left_out else []
     if muscles.failures.any():
         failed = [name for name, count in zip(muscles.names, muscles.failures, strict=True) if count]
         notes.append(f"paths not found at some steps: {'in red' if many else ', '.join(failed)}")
     figure.supxlabel("; ".join(notes), fontsize=8, color="0.4")
-    axes[-1, 0].set_xlabel("time [s]")
-    axes[-1, 0].set_xlim(time[0], max(time[-1], time[0] + 1e-9))
     figure.suptitle(title, fontsize=11)
     save_figure(figure, output)
+
+
+def _panels(joints: list[str], quantities: list[str], count: int) -> tuple[Any, dict[str, Any]]:
+    """Return a figure and its axes by panel: one below the other, or with many muscles their maps side by side.
+
+    Side by side the maps share the muscles' names, and a figure is only as tall as these.
+    """
+    if count <= LINES:
+        panels = [*joints, *quantities] or [""]
+        figure, axes = plt.subplots(
+            len(panels), 1, sharex=True, squeeze=False, figsize=(11.0, 2.3 * len(panels) + 0.9), layout="constrained"
+        )  # fmt: skip
+        axes[-1, 0].set_xlabel("time [s]")
+        return figure, dict(zip(panels, axes[:, 0], strict=True))
+    tall = max(3.0, NAME * count)
+    figure = plt.figure(figsize=(15.0, 2.6 * len(joints) + tall + 1.0), layout="constrained")
+    grid = figure.add_gridspec(
+        len(joints) + 1, len(quantities), height_ratios=[2.6] * len(joints) + [tall]
+    )  # fmt: skip
+    places = {panel: figure.add_subplot(grid[k, :]) for k, panel in enumerate(joints)}
+    for k, panel in enumerate(quantities):
+        places[panel] = figure.add_subplot(grid[len(joints), k])
+        if k:
+            places[panel].sharey(places[quantities[0]])
+            places[panel].tick_params(labelleft=False)
+    for axis in places.values():
+        axis.set_xlabel("time [s]")
+    return figure, places
 
 
 def _joints(model: mujoco.MjModel, qpos: Array) -> tuple[dict[str, Array], dict[str, Array], int]:
@@ -96,7 +120,9 @@ def _muscle_panel(
     figure: Any, axis: Any, time: Array, panel: str, muscles: MuscleSystem, history: PlotHistory, many: bool
 ) -> None:
     values = history.column({"activation": 2, "length": 3, "tension": 4}[panel])
-    label = {"activation": "activation", "length": "length [mm]", "tension": "tension [N]"}[panel]
+    cables = len(muscles.cables) if isinstance(muscles, CableSystem) else 0
+    drive = "control" if cables == muscles.n else "activation, control of cables" if cables else "activation"
+    label = {"activation": drive, "length": "length [mm]", "tension": "tension [N]"}[panel]
     if panel == "length":
         values = 1e3 * values
     if not many:
@@ -117,8 +143,9 @@ def _muscle_panel(
     picture = axis.pcolormesh(
         edges, np.arange(muscles.n + 1), values.T, cmap=colours, norm=norm, rasterized=True
     )
-    axis.set_yticks(np.arange(muscles.n) + 0.5, muscles.names, fontsize=6.5)
-    for tick, failures in zip(axis.get_yticklabels(), muscles.failures, strict=True):
-        tick.set_color("red" if failures else "black")
-    axis.invert_yaxis()
-    figure.colorbar(picture, ax=axis, label=label, pad=0.01, aspect=30)
+    if panel == QUANTITIES[0]:
+        axis.set_yticks(np.arange(muscles.n) + 0.5, muscles.names, fontsize=6.5)
+        for tick, failures in zip(axis.get_yticklabels(), muscles.failures, strict=True):
+            tick.set_color("red" if failures else "black")
+        axis.invert_yaxis()
+    figure.colorbar(picture, ax=axis, label=label, location="top", pad=0.005, aspect=30)

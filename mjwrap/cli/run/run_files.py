@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FilmSettings:
-    """The settings of a film, as `Video` takes them: width and height [pixels], frames per second, speed, camera."""
+    """The settings of a film, as `Video` takes them: width and height [pixels], frames per second, speed, the look."""
 
     path: str
     width: int
@@ -32,6 +32,11 @@ class FilmSettings:
     fps: float
     speed: float
     camera: str | None
+    background: str = "light"
+    colors: str | None = None
+    surfaces: bool | None = None
+    legend: bool | None = None
+    shadows: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,8 @@ def _open_film(film: FilmSettings, engine: PluginEngine, stack: contextlib.ExitS
         opened(
             lambda: Video(
                 engine.model, film.path, fps=film.fps, speed=film.speed, width=film.width, height=film.height,
-                camera=film.camera,
+                camera=film.camera, background=film.background, colors=film.colors, surfaces=film.surfaces,
+                legend=film.legend, shadows=film.shadows,
             )
         )
     )  # fmt: skip

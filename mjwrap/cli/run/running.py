@@ -16,19 +16,23 @@ from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import end, serve_until_stopped
 from mjwrap.cli.common.stopping import Interrupt, Stopped
+from mjwrap.cli.run.ending import UNSAVED, ended, positions, undriven
+from mjwrap.cli.run.mistakes import warn
 from mjwrap.cli.run.run_files import OutputSettings, open_outputs
+from mjwrap.errors import ModelError
 from mjwrap.files.atomic import uninterrupted
 from mjwrap.recording import Server, serve
 from mjwrap.runs.engine import MODES
 from mjwrap.runs.simulation import RunSettings, Simulation, WallTime
-from mjwrap.text import counted
+from mjwrap.system import CableSystem
+from mjwrap.text import counted, counted_paths
 
 
 @dataclass(frozen=True)
 class RunCommandSettings:
     """The settings of `mjwrap run`.
 
-    model: a file, or "myo_sim:NAME". serve_port: port on which the run is served to a browser, or None. json: a file
+    model: a file or a model by name. serve_port: port on which the run is served to a browser, or None. json: a file
     for the report as values, "-" for standard output, or None.
     """
 
@@ -51,7 +55,12 @@ def run(settings: RunCommandSettings) -> int:
                 if server:
                     wanted = replace(wanted, recording=replace(wanted.recording, connect=server.connect))
                 outputs = open_outputs(wanted, settings.model, simulation.engine, held)
-            simulation.begin()
+            try:
+                simulation.begin()
+            except ModelError:  # an end lies inside a surface, which may be too large
+                warn(settings.model, simulation)
+                raise
+            warn(settings.model, simulation)
             with Interrupt() as interrupt:
                 spent = advance(simulation, outputs, interrupt)
                 closing = time.perf_counter()
@@ -69,7 +78,7 @@ def run(settings: RunCommandSettings) -> int:
             )
             return interrupt.asked.code
         if server:
-            told = "mjwrap run: the run is complete and still served; press Ctrl-C to stop"
+            told = f"mjwrap run: the run is complete and still served; press Ctrl-C to stop\n{_open(server)}"
             served = serve_until_stopped(server, lambda: print(told, file=sys.stderr))
             return served or (RUN_FAILED if outputs.failed else 0)
         return RUN_FAILED if outputs.failed else 0
@@ -82,8 +91,17 @@ def start_server(port: int | None, stack: contextlib.ExitStack) -> Server | None
     with uninterrupted():
         server = opened(lambda: serve(port=port))
         stack.callback(end, server)
-    print(f"mjwrap run: open {server.address}", file=sys.stderr)
+    print(
+        f"mjwrap run: rerun serves its viewer for a browser on this machine at port {port}, and the run at port "
+        f"{port + 1}, until Ctrl-C\n{_open(server)}",
+        file=sys.stderr,
+    )
     return server
+
+
+def _open(server: Server) -> str:
+    """Return the line with the address, which comes last."""
+    return f"mjwrap run: open {server.address}"
 
 
 def advance(simulation: Simulation, outputs: Outputs, interrupt: Interrupt) -> WallTime:
@@ -104,9 +122,10 @@ def tell(
     """Print the settings, the speed and the problems of the run, and its files."""
     engine, muscles = simulation.engine, simulation.muscles
     simulated = engine.data.time
+    cables = len(muscles.cables) if isinstance(muscles, CableSystem) else 0
     mode = "" if settings.run.mode == MODES[0] else f", plugin mode {settings.run.mode}"
     step = f"{_integrator(engine.model)}, time step {1e3 * engine.model.opt.timestep:g} ms"
-    report.say(f"{settings.model}: {counted(muscles.n, 'muscle')}, {step}{mode}")
+    report.say(f"{settings.model}: {counted_paths(muscles.n, cables)}, {step}{mode}")
     wall = spent.simulation
     rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
@@ -121,8 +140,14 @@ def tell(
         report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
+    report.say(ended(simulation))
+    if sentence := undriven(simulation):
+        report.say(sentence)
     for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
+    wanted = settings.outputs
+    if not (wanted.files or wanted.recording.wanted or settings.json or settings.serve_port):
+        report.say(UNSAVED)
 
 
 def facts(
@@ -140,6 +165,8 @@ def facts(
         "integrator": _integrator(engine.model),
         "timestep": float(engine.model.opt.timestep),
         "simulated": float(engine.data.time),
+        "positions": positions(simulation),
+        "undriven": undriven(simulation),
         "wall": spent.simulation,
         "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,

@@ -66,13 +66,15 @@ def _image(address: int, instance: int) -> bytes:
             _IMAGES.move_to_end(key)
             return _IMAGES[key]
     configuration = configuration_at(address, instance)
-    with copy_read(address, configuration) as (model, plan, muscles):
+    with copy_read(address, configuration) as (model, plan, muscles, left_out):
         if state_size(plan) != configuration.numbers:
             raise ModelError(
                 f"the muscles' paths have changed since mjwrap.install: their state needs "
                 f"{state_size(plan)} numbers and has {configuration.numbers}; call install again"
             )
-        image = block_image(model, instance, plan, muscles, entries(), free_function(), _rebuild_function())
+        image = block_image(
+            model, instance, plan, muscles, left_out, entries(), free_function(), _rebuild_function()
+        )
     if key[0] is None:
         return image
     with _LOCK:

@@ -18,6 +18,7 @@ from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.blocks.model_changes import Watch, watch
+from mjwrap.plugin.blocks.published_part import published_part
 from mjwrap.plugin.blocks.transmission_part import transmission_part
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing as dr
@@ -52,7 +53,7 @@ def state_size(plan: Plan) -> int:
 
 
 def _arrays(
-    model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration], watched: Watch
+    model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration], left_out: set[int], watched: Watch
 ) -> dict[str, Any]:
     n, nodes, routes = plan.n, len(plan.node), len(plan.routes)
     sketch = drawing()
@@ -80,6 +81,7 @@ def _arrays(
         "written": np.zeros(model.nbody, dtype=np.bool_),
         "clock": np.zeros(bk.CLOCK),
         "transmission": transmission_part(model, plan, muscles),
+        "published": published_part(model, plan, muscles, left_out),
         "tendon": np.array([m.tendon for m in muscles], dtype=np.int64),
         "actuator": np.array([m.actuator for m in muscles], dtype=np.int64),
         "labels": np.array([m.name.encode()[: dr.LABEL - 1] for m in muscles], dtype=f"S{dr.LABEL}"),
@@ -96,11 +98,15 @@ def block_image(
     instance: int,
     plan: Plan,
     muscles: list[MuscleDeclaration],
+    left_out: set[int],
     entries: Entries,
     free: int,
     rebuild: int,
 ) -> bytes:
-    """Return the block for an instance of the plugin; free, rebuild: addresses of functions."""
+    """Return the block for an instance of the plugin.
+
+    left_out: tendons that the running model leaves out. free, rebuild: addresses of functions.
+    """
     watched = watch(model, plan, muscles)
     head = np.zeros(bk.HEAD, dtype=np.int64)
     head[bk.MUSCLES], head[bk.NODES], head[bk.ROUTES] = plan.n, len(plan.node), len(plan.routes)
@@ -109,6 +115,7 @@ def block_image(
     head[bk.LOADED], head[bk.NSTATE] = len(loaded_bodies(plan)), state_size(plan)
     head[bk.STATE_ADDRESS] = model.plugin_stateadr[instance]
     head[bk.STAGE], head[bk.FINISH], head[bk.FREE] = entries.stage.address, entries.finish.address, free
+    head[bk.PUBLISH] = entries.publish.address
     head[bk.RUNGE_KUTTA] = int(mujoco.mjtIntegrator.mjINT_RK4)
     head[bk.NO_ACTUATION] = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     head[bk.INSTANCE], head[bk.REBUILD], head[bk.BOUND] = instance, rebuild, len(watched.bound)
@@ -121,7 +128,9 @@ def block_image(
         head[bk.DRAW] = entries.draw.address
         head[bk.HEAD - len(bk.DRAWING) :] = sketch.words
     pieces, here = [], 8 * bk.HEAD
-    for place, array in enumerate(_arrays(model, plan, muscles, watched).values(), start=bk.A_ROUTES):
+    for place, array in enumerate(
+        _arrays(model, plan, muscles, left_out, watched).values(), start=bk.A_ROUTES
+    ):
         head[place] = here
         piece = np.ascontiguousarray(array).tobytes()
         pieces.append(piece + bytes(-len(piece) % 8))
@@ -134,7 +143,7 @@ def block_image(
 _CONSTANT = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
     "weights", "params", "ctrl_low", "ctrl_high", "times", "node", "bound", "drives", "transmission",
-    "tendon", "actuator", "labels",
+    "published", "tendon", "actuator", "labels",
 )  # fmt: skip
 
 

@@ -15,18 +15,19 @@ from mjwrap.model.arrays import Plan, build_plan
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.mujoco_c.copies import copy_of
 from mjwrap.plugin.spec.configuration import TRANSMISSION, Configuration, configuration_at
-from mjwrap.plugin.spec.tendons import restore_tendons
+from mjwrap.plugin.spec.tendons import left_out_tendons, restore_tendons
 
 _COPY = threading.Lock()  # locked while the copy of a model is read
 _here = threading.local()  # .reading: this thread reads the copy of a model
 
 
 class Copy(NamedTuple):
-    """A copy of a model, its muscles, and their arrays."""
+    """A copy of a model as before `install`, its muscles, their arrays, and the tendons that the model leaves out."""
 
     model: mujoco.MjModel
     plan: Plan
     muscles: list[MuscleDeclaration]
+    left_out: set[int]
 
 
 def read_muscles(
@@ -76,6 +77,7 @@ def _read_copy(address: int, configuration: Configuration) -> Copy:
     try:
         model = copy_of(address)
         names, _, mode, side_rule = configuration
-        return Copy(model, *read_muscles(model, names, mode, side_rule))
+        left_out = left_out_tendons(model)
+        return Copy(model, *read_muscles(model, names, mode, side_rule), left_out)
     finally:
         _here.reading = False

@@ -8,69 +8,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.errors import ModelError
-from mjwrap.kernels.coupling import muscle_paths
-from mjwrap.mjcf import MuscleDeclaration, name_of
+from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.model.arrays import Plan
-from mjwrap.model.kinematic_tree import last_dofs, moving_dofs
+from mjwrap.model.kinematic_tree import last_dofs
+from mjwrap.model.moment_columns import check_moment_columns
+from mjwrap.plugin.blocks.length_sensors import length_sensors
 from mjwrap.plugin.callbacks import transmission as tr
 from mjwrap.plugin.mujoco_c.offsets import offsets
-from mjwrap.plugin.spec.tendon_uses import is_measured_late, shown_tendons
+from mjwrap.plugin.spec.tendon_uses import shown_tendons
 
 Ints = NDArray[np.int64]
-OBJ = mujoco.mjtObj
-
-
-def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
-    """Return the dofs for which MuJoCo stores the moment of an actuator: those that move its tendon's bodies."""
-    tendon = int(model.actuator_trnid[actuator, 0])
-    first = int(model.ten_J_rowadr[tendon])
-    return {int(dof) for dof in model.ten_J_colind[first : first + int(model.ten_J_rownnz[tendon])]}
-
-
-def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> None:
-    """Raise `ModelError` if the path of a muscle depends on a dof for which MuJoCo stores no moment of its actuator."""
-    moves = moving_dofs(model)
-    for route in plan.routes:
-        muscle = muscles[int(route[muscle_paths.R_MUSCLE])]
-        if plan.output[route[muscle_paths.R_MUSCLE]] < 0:
-            continue
-        stops = plan.links[route[muscle_paths.R_LO] : route[muscle_paths.R_HI], muscle_paths.L_BODY].tolist()
-        bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
-        moved = {body: set(np.flatnonzero(moves[body]).tolist()) for body in bodies}
-        stored = _columns(model, muscle.actuator) | set.intersection(*moved.values())
-        for body, dofs in moved.items():
-            if not dofs <= stored:
-                tendon = name_of(model, OBJ.mjOBJ_TENDON, int(model.actuator_trnid[muscle.actuator, 0]))
-                raise ModelError(
-                    f"muscle '{muscle.name}': its path runs over body '{name_of(model, OBJ.mjOBJ_BODY, body)}', which "
-                    f"tendon '{tendon}' does not touch, so MuJoCo does not store its moment there; let the tendon "
-                    f"pass a site on that body, or use mode 'wrench'"
-                )
-
-
-def _sensors(model: mujoco.MjModel, plan: Plan, tendons: Ints) -> list[tuple[int, int, int, float]]:
-    """Return the sensors of lengths: index in sensordata, muscle, whether of an actuator, and cutoff [m]."""
-    kinds = mujoco.mjtSensor
-    by_output = {int(out): m for m, out in enumerate(plan.output) if out >= 0}
-    by_tendon = {int(tendon): m for m, tendon in enumerate(tendons) if tendon >= 0}
-    found: list[tuple[int, int, int, float]] = []
-    for i in range(model.nsensor):
-        kind, item = int(model.sensor_type[i]), int(model.sensor_objid[i])
-        if is_measured_late(model, i):
-            continue
-        muscle = None
-        if kind == int(kinds.mjSENS_ACTUATORPOS):
-            muscle = by_output.get(int(model.actuator_outadr[item]))
-        elif kind == int(kinds.mjSENS_TENDONPOS):
-            muscle = by_tendon.get(item)
-        if muscle is not None:
-            cutoff = float(model.sensor_cutoff[i])
-            limit = cutoff if cutoff > 0.0 else np.inf
-            found.append(
-                (int(model.sensor_adr[i]), muscle, int(kind == int(kinds.mjSENS_ACTUATORPOS)), limit)
-            )
-    return found
 
 
 def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDeclaration]) -> Ints:
@@ -86,7 +33,10 @@ def transmission_part(model: mujoco.MjModel, plan: Plan, muscles: list[MuscleDec
         [t if out >= 0 and t in shown else -1 for t, out in zip(pulled, plan.output, strict=True)],
         dtype=np.int64,
     )
-    sensors = _sensors(model, plan, tendons)
+    by_output = {int(out): m for m, out in enumerate(plan.output) if out >= 0}
+    sensors = length_sensors(
+        model, by_output, {int(tendon): m for m, tendon in enumerate(tendons) if tendon >= 0}
+    )
     head[tr.DOFS], head[tr.OUTPUTS], head[tr.MOMENTS] = model.nv, model.nout, model.nJmom
     head[tr.TENDONS], head[tr.TENDON_MOMENTS] = model.ntendon, model.nJten
     head[tr.SENSORS], head[tr.SENSOR_NUMBERS] = len(sensors), model.nsensordata

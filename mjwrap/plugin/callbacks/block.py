@@ -29,13 +29,14 @@ RUNGE_KUTTA, NO_ACTUATION = 32, 33
 # for `sync.py`: the model at the last update, its instance, the function that rewrites the block, and the number of
 # regions of each kind
 MODEL, INSTANCE, REBUILD, PLAIN, DERIVED, STRUCTURE, BOUND = 34, 35, 36, 37, 38, 39, 40
+PUBLISH = 41  # a function: shows the forces of muscles that act by wrenches
 # offsets of the arrays
 ARRAYS = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
     "weights", "params", "ctrl_low", "ctrl_high", "times",
     "node", "seg", "count", "info", "own", "excitation", "drive", "start_activation", "start_fiber", "start_length",
     "activation", "fiber", "length", "velocity", "tension", "next_activation", "next_fiber", "status",
-    "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost", "transmission",
+    "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost", "transmission", "published",
     "tendon", "actuator", "labels", "blank",
     "plain", "plain_seen", "derived", "derived_seen", "structure", "structure_seen", "bound", "drives", "pointers",
 )  # fmt: skip
@@ -44,7 +45,7 @@ ARRAYS = (
     A_WEIGHTS, A_PARAMS, A_CTRL_LOW, A_CTRL_HIGH, A_TIMES,
     A_NODE, A_SEG, A_COUNT, A_INFO, A_OWN, A_EXCITATION, A_DRIVE, A_START_ACTIVATION, A_START_FIBER, A_START_LENGTH,
     A_ACTIVATION, A_FIBER, A_LENGTH, A_VELOCITY, A_TENSION, A_NEXT_ACTIVATION, A_NEXT_FIBER, A_STATUS,
-    A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST, A_TRANSMISSION,
+    A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST, A_TRANSMISSION, A_PUBLISHED,
     A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
     A_PLAIN, A_PLAIN_SEEN, A_DERIVED, A_DERIVED_SEEN, A_STRUCTURE, A_STRUCTURE_SEEN, A_BOUND, A_DRIVES, A_POINTERS,
 ) = range(48, 48 + len(ARRAYS))  # fmt: skip

@@ -16,12 +16,14 @@ from mjwrap.kernels.coupling.groups import Paths, Poses, Routes
 from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart, Timing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing
+from mjwrap.plugin.callbacks import publishing as pb
 from mjwrap.plugin.callbacks import stage as st
 from mjwrap.plugin.callbacks._cache import callback, jit
 from mjwrap.plugin.callbacks.block_table import block_at, block_of_state, place_of, remove_entry
 from mjwrap.plugin.callbacks.memory import call, call_with_four, read_int64, write_int64
 
 _WORD, _INT = types.int64, types.int32
+ACTUATOR = 1  # mjPLUGIN_ACTUATOR: what MuJoCo asks for, if not passive forces
 
 
 class Hooks(NamedTuple):
@@ -40,6 +42,7 @@ class Entries(NamedTuple):
 
     stage: Any
     finish: Any
+    publish: Any
     draw: Any
 
 
@@ -67,7 +70,12 @@ def compile_entries() -> Entries:
     evaluate.compile(_evaluation())
     evaluate.get_overload(_evaluation())
     draw = callback(types.void(_WORD, _WORD, _WORD, _WORD), drawing.draw)
-    return Entries(callback(signature, st.stage), callback(signature, st.finish), draw)
+    return Entries(
+        callback(signature, st.stage),
+        callback(signature, st.finish),
+        callback(signature, pb.publish_forces),
+        draw,
+    )
 
 
 @jit
@@ -105,7 +113,8 @@ def compile_hooks(offsets: dict[str, int]) -> Hooks:
     def compute(model, data, instance, capability):
         block = _block(data, instance, nplugin, plugin_data)
         if block != 0:
-            call(read_int64(block + 8 * bk.STAGE), block, model, data)
+            entry = bk.PUBLISH if capability == ACTUATOR else bk.STAGE
+            call(read_int64(block + 8 * entry), block, model, data)
 
     def advance(model, data, instance):
         block = _block(data, instance, nplugin, plugin_data)

@@ -23,6 +23,7 @@ from mjwrap.plugin.callbacks.groups import (
     states_of,
 )
 from mjwrap.plugin.callbacks.memory import bool_array, float64_array, read_float64, read_int32, read_int64
+from mjwrap.plugin.callbacks.publishing import COUNT, publish_lengths
 from mjwrap.plugin.callbacks.saving import floats, ints, load, load_held, save, sizes, state_of
 from mjwrap.plugin.callbacks.sync import sync_with_model
 from mjwrap.plugin.callbacks.transmission import transmit
@@ -152,6 +153,9 @@ def stage(block, model, data):
     _add_wrenches(block, data, state, wrench)
     if transmits:
         transmit(part, block, model, data, since == 0.0, routes, poses, paths, states)
+    shown = block + read_int64(block + 8 * bk.A_PUBLISHED)
+    if read_int64(shown + 8 * COUNT) != 0:
+        publish_lengths(shown, block, model, data, since == 0.0, states.length, states.velocity)
     clock[bk.ACTED] = 1.0
 
 

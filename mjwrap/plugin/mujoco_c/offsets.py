@@ -29,8 +29,8 @@ MODEL_POINTERS = ("actuator_gear",)
 MODEL_PLUGIN_POINTERS = ("plugin_stateadr",)
 DATA_POINTERS = (
     "qpos", "qvel", "act", "ctrl", "xfrc_applied", "xipos", "geom_xpos", "geom_xmat", "site_xpos", "subtree_com",
-    "cdof", "cvel", "act_dot", "actuator_length", "actuator_velocity", "moment_rownnz", "moment_rowadr",
-    "moment_colind", "actuator_moment", "ten_length", "ten_velocity", "ten_J", "sensordata",
+    "cdof", "cvel", "act_dot", "actuator_length", "actuator_velocity", "actuator_force", "moment_rownnz",
+    "moment_rowadr", "moment_colind", "actuator_moment", "ten_length", "ten_velocity", "ten_J", "sensordata",
 )  # fmt: skip
 PLUGIN_POINTERS = ("plugin_state", "plugin_data")
 OPTIONS = ("timestep", "integrator", "disableflags", "disableactuator")

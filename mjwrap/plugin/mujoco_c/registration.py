@@ -10,7 +10,7 @@ from mjwrap.plugin.mujoco_c.library import MjpPlugin, library
 PLUGIN_NAME = "mjwrap.muscles"  # of the engine plugin
 # names of the texts of its configuration, which the model keeps in this order (`mjcf/marks.py` reads the fourth)
 ATTRIBUTES = MUSCLES, NUMBERS, MODE, SIDE_RULE = "muscles", "numbers", "mode", "side_rule"
-_PASSIVE, _STAGE_ACC = 4, 3  # mjPLUGIN_PASSIVE, mjSTAGE_ACC
+_ACTUATOR, _PASSIVE, _STAGE_ACC = 1, 4, 3  # mjPLUGIN_ACTUATOR, mjPLUGIN_PASSIVE, mjSTAGE_ACC
 
 
 def slot_of(name: str) -> int:
@@ -21,7 +21,7 @@ def slot_of(name: str) -> int:
 
 
 def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str, ...] = ()) -> None:
-    """Register a plugin for passive forces, unless one with this name is registered.
+    """Register a plugin for passive forces and actuators, unless one with this name is registered.
 
     callbacks: numba or ctypes functions by their field in mjpPlugin; attributes: names of its configuration values.
     """
@@ -30,7 +30,7 @@ def register_plugin(name: str, callbacks: dict[str, Any], attributes: tuple[str,
         return
     texts = (ctypes.c_char_p * max(1, len(attributes)))(*(text.encode() for text in attributes))
     plugin = MjpPlugin(name=name.encode(), nattribute=len(attributes), attributes=texts)
-    plugin.capabilityflags, plugin.needstage = _PASSIVE, _STAGE_ACC
+    plugin.capabilityflags, plugin.needstage = _PASSIVE | _ACTUATOR, _STAGE_ACC
     for field, function in callbacks.items():
         setattr(plugin, field, address_of(function))
         keep_forever(function)

@@ -8,13 +8,12 @@ import mujoco
 import numpy as np
 
 from mjwrap.mjcf import MuscleDeclaration
-from mjwrap.muscles.laws import ActuatorForce
 
 _TENDON, _ACTUATOR = int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_ACTUATOR)
 _PULLS = int(mujoco.mjtTrn.mjTRN_TENDON)
 _SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
 _POSITION = int(mujoco.mjtStage.mjSTAGE_POS)
-_FORCES = (int(mujoco.mjtSensor.mjSENS_FORCE), int(mujoco.mjtSensor.mjSENS_TORQUE))
+FORCE_SENSORS = (int(mujoco.mjtSensor.mjSENS_FORCE), int(mujoco.mjtSensor.mjSENS_TORQUE))
 # fields of a tendon and of an actuator that are all zero if it only transmits the actuator's force
 _TENDON_ACTS = (
     "tendon_limited", "tendon_stiffness", "tendon_stiffnesspoly", "tendon_damping", "tendon_dampingpoly",
@@ -44,13 +43,28 @@ def _is_used(model: mujoco.MjModel, tendon: int) -> bool:
     )
 
 
+def pulled_by(model: mujoco.MjModel, actuator: int) -> int:
+    """Return the tendon that an actuator pulls, spatial or fixed; -1 if it pulls none, or for actuator -1."""
+    if actuator < 0 or int(model.actuator_trntype[actuator]) != _PULLS:
+        return -1
+    return int(model.actuator_trnid[actuator, 0])
+
+
+def tendon_of(model: mujoco.MjModel, muscle: MuscleDeclaration) -> int:
+    """Return the spatial tendon whose length is that of a muscle: which its actuator pulls, or its own; or -1."""
+    if muscle.actuator >= 0 and pulled_by(model, muscle.actuator) != muscle.tendon:
+        return -1
+    return muscle.tendon
+
+
 def shown_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> set[int]:
     """Return the tendons that can show mjwrap's path: all their actuators pull along it, and they do nothing else."""
     paths: dict[int, set[Any]] = {}
     for muscle in muscles:
-        if isinstance(muscle.parameters, ActuatorForce):
-            paths.setdefault(int(model.actuator_trnid[muscle.actuator, 0]), set()).add(muscle.routes)
-    own = {muscle.actuator for muscle in muscles if isinstance(muscle.parameters, ActuatorForce)}
+        tendon = tendon_of(model, muscle)
+        if tendon >= 0:
+            paths.setdefault(tendon, set()).add(muscle.routes)
+    own = {muscle.actuator for muscle in muscles}
     return {
         tendon
         for tendon, routes in paths.items()
@@ -70,15 +84,15 @@ def _is_scaled(model: mujoco.MjModel, actuator: int) -> bool:
     return muscle and bool(model.actuator_gainprm[actuator, 2] < 0.0)
 
 
-def _is_measured(model: mujoco.MjModel, kind: int, item: int, transmitted: bool) -> bool:
+def _is_measured(model: mujoco.MjModel, kind: int, item: int, shown: bool) -> bool:
     """Return whether a sensor needs the length of a tendon or actuator along MuJoCo's own path.
 
-    transmitted: the sensor shows mjwrap's path, except for lengths that MuJoCo stores before mjwrap computes them.
+    shown: the sensor shows mjwrap's path, except for lengths that MuJoCo stores before mjwrap computes them.
     """
     measured = (model.sensor_objtype == kind) & (model.sensor_objid == item)
     measured |= (model.sensor_reftype == kind) & (model.sensor_refid == item)
     return any(
-        not transmitted or (int(model.sensor_needstage[i]) == _POSITION and is_measured_late(model, int(i)))
+        not shown or (int(model.sensor_needstage[i]) == _POSITION and is_measured_late(model, int(i)))
         for i in np.flatnonzero(measured)
     )
 
@@ -96,10 +110,10 @@ def is_needed(model: mujoco.MjModel, tendon: int, taken: dict[int, bool], shown:
         return True
     if model.tendon_actfrclimited[tendon] and not all(taken[actuator] for actuator in pulling):
         return True
-    if np.isin(model.sensor_type, _FORCES).any() and any(taken[actuator] for actuator in pulling):
+    if np.isin(model.sensor_type, FORCE_SENSORS).any() and any(taken[actuator] for actuator in pulling):
         return True  # these sensors feel MuJoCo's actuators along MuJoCo's tendons
     if any(taken[actuator] and _is_scaled(model, actuator) for actuator in pulling):
         return True
     return _is_measured(model, _TENDON, tendon, tendon in shown) or any(
-        _is_measured(model, _ACTUATOR, actuator, taken[actuator]) for actuator in pulling
+        _is_measured(model, _ACTUATOR, actuator, True) for actuator in pulling
     )

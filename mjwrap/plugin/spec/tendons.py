@@ -31,10 +31,14 @@ def remove_unneeded_tendons(model: mujoco.MjModel, muscles: list[MuscleDeclarati
         if not marks.lacks_stops(model, tendon) and not is_needed(model, tendon, taken, shown):
             marks.remove_stops(model, tendon)
     for actuator in _muscles_without_stops(model):
-        disabled = tuple(model.actuator_forcerange[actuator]) == marks.DISABLED_RANGE
+        disabled = marks.has_disabled_range(model, actuator)
         if marks.has_curves(model, actuator) and model.actuator_forcelimited[actuator] and disabled:
             marks.remove_curves(model, actuator)
-            model.actuator_forcerange[actuator] = 0.0
+
+
+def left_out_tendons(model: mujoco.MjModel) -> set[int]:
+    """Return the tendons whose stops were removed."""
+    return {tendon for tendon in range(model.ntendon) if marks.lacks_stops(model, tendon)}
 
 
 def restore_tendons(model: mujoco.MjModel) -> None:

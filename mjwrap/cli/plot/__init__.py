@@ -1,0 +1,1 @@
+"""`mjwrap plot`: curves of muscles over a joint, with data over them."""

@@ -1,0 +1,99 @@
+"""What a run says at its end: where it ended, why nothing may have moved, and what it could have saved."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.mjcf import name_of
+from mjwrap.runs.simulation import Simulation
+from mjwrap.text import counted
+
+MOST = 6  # joints of which the position is told
+STILL = 1e-6  # [rad, m] largest change of the position of a joint that has not moved
+UNSAVED = (
+    "nothing was saved: --plot FILE.png draws curves, --record FILE.rrd keeps a recording, --video FILE.gif a film, "
+    "--out FILE.sto a table"
+)
+
+
+def ended(simulation: Simulation) -> str:
+    """Return the time and the positions of the joints at the end, at most `MOST` of them: those that moved most.
+
+    Hinges in degrees, slides in mm, balls by the angle from the reference [degrees], free joints by their place [mm].
+    """
+    model, data = simulation.engine.model, simulation.engine.data
+    moved = _changes(model, simulation.start, data.qpos)
+    chosen = sorted(sorted(range(model.njnt), key=lambda j: -moved[j])[:MOST])
+    parts = [
+        f"{name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j)} {_position(model, data.qpos, j)}" for j in chosen
+    ]
+    rest = f" (of {counted(model.njnt, 'joint')} those that moved most)" if model.njnt > MOST else ""
+    return f"ended at {data.time:.6g} s{' with ' * bool(parts)}{', '.join(parts)}{rest}"
+
+
+def positions(simulation: Simulation) -> dict[str, list[float]]:
+    """Return the position of every joint at the end, as in qpos [rad, m], by name."""
+    model, data = simulation.engine.model, simulation.engine.data
+    ends = [*model.jnt_qposadr.tolist(), model.nq][1:]
+    return {
+        name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j): data.qpos[model.jnt_qposadr[j] : ends[j]].tolist()
+        for j in range(model.njnt)
+    }
+
+
+def undriven(simulation: Simulation) -> str:
+    """Return a sentence if all controls were zero during the whole run, which may be why nothing moved, else ""."""
+    excitation = simulation.excitation
+    if not excitation.names or simulation.prescribed.joints or simulation.driven:
+        return ""
+    model, data = simulation.engine.model, simulation.engine.data
+    still = not model.njnt or max(_changes(model, simulation.start, data.qpos)) < STILL
+    pulling = excitation.muscle_names
+    one = (pulling or excitation.names)[0]
+    add = f"add --excitation pulses, or for one of them --excitation {one}=constant:0.5"
+    if not pulling:
+        add = f"add --excitation {one}=constant:0.5"
+    if still:
+        return f"nothing moved, because all controls are zero: {add}"
+    return f"all controls were zero, so that only gravity, springs and passive forces moved it: {add}"
+
+
+def _changes(model: mujoco.MjModel, before: NDArray[np.float64], after: NDArray[np.float64]) -> list[float]:
+    """Return by how much each joint has moved [rad or m]; a free joint by the larger of its translation and turn."""
+    found = []
+    for j in range(model.njnt):
+        adr, kind = int(model.jnt_qposadr[j]), int(model.jnt_type[j])
+        if kind in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
+            found.append(abs(float(after[adr] - before[adr])))
+            continue
+        free = kind == int(mujoco.mjtJoint.mjJNT_FREE)
+        path = float(np.linalg.norm(after[adr : adr + 3] - before[adr : adr + 3])) if free else 0.0
+        quat = slice(adr + 3, adr + 7) if free else slice(adr, adr + 4)
+        found.append(max(path, _angle(before[quat], after[quat])))
+    return found
+
+
+def _angle(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    """Return the angle [rad] between two orientations."""
+    turn = np.zeros(3)
+    mujoco.mju_subQuat(turn, second, first)
+    return float(np.linalg.norm(turn))
+
+
+def _position(model: mujoco.MjModel, qpos: NDArray[np.float64], joint: int) -> str:
+    """Return the position of a joint as text."""
+    adr, kind = int(model.jnt_qposadr[joint]), int(model.jnt_type[joint])
+    if kind == int(mujoco.mjtJoint.mjJNT_HINGE):
+        return f"{_rounded(np.degrees(qpos[adr]), 1)}°"
+    if kind == int(mujoco.mjtJoint.mjJNT_SLIDE):
+        return f"{_rounded(1e3 * qpos[adr], 2):g} mm"
+    if kind == int(mujoco.mjtJoint.mjJNT_BALL):
+        return f"{_rounded(np.degrees(_angle(np.array([1.0, 0.0, 0.0, 0.0]), qpos[adr : adr + 4])), 1)}°"
+    return f"({', '.join(f'{_rounded(1e3 * x, 1):g}' for x in qpos[adr : adr + 3])}) mm"
+
+
+def _rounded(value: float, digits: int) -> float:
+    """Return a number with so many digits behind the point, and zero without a sign."""
+    return round(float(value), digits) + 0.0

@@ -1,0 +1,104 @@
+"""Models by name: "mjwrap:NAME" for those that come with mjwrap, "myo_sim:NAME" for those of the myo-sim package."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.metadata
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.names import listed
+
+OWN, MYO = "mjwrap:", "myo_sim:"
+_PACKAGE = Path(__file__).resolve().parents[1]
+# a wheel has the models inside the package (pyproject.toml, force-include), a clone beside it
+_FOLDERS = (_PACKAGE / "models", _PACKAGE.parent / "models")
+
+
+def own_models() -> dict[str, Path]:
+    """Return the files of the models that come with mjwrap, by name."""
+    for folder in _FOLDERS:
+        found = {file.stem: file for file in sorted(folder.glob("*/*.xml"))}
+        if "elbow" in found:
+            return found
+    return {}
+
+
+def own_file(source: str) -> Path:
+    """Return the file of "mjwrap:NAME"; `ModelError`, which lists the models, if there is no such one."""
+    name, known = source.removeprefix(OWN), own_models()
+    if name not in known:
+        raise ModelError(f"mjwrap has no model '{name}'{nearest(name, known)}; it has: {listed(known)}")
+    return known[name]
+
+
+def myo_spec(source: str) -> mujoco.MjSpec:
+    """Return the spec of "myo_sim:NAME", with the postures that the package adds as keyframes.
+
+    Raises `ModelError`, which names the installed versions and the models that exist, if the package is missing or
+    cannot be loaded, has no such model, or cannot build it with the running MuJoCo.
+    """
+    name = source.removeprefix(MYO)
+    try:
+        package: Any = importlib.import_module("myo_sim")
+    except ImportError as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "myo_sim":
+            raise ModelError(
+                f"'{source}' needs the myo-sim package, which is not installed: pip install 'mjwrap[myo]'; models "
+                f"that come with mjwrap: {listed(OWN + own for own in own_models())}"
+            ) from None
+        raise _broken(source, error) from None
+    except Exception as error:  # a damaged or unfitting package may raise anything
+        raise _broken(source, error) from None
+    try:
+        composed = getattr(package, "_composed_models", tuple)()
+        known = sorted({*package.REGISTRY, *composed})
+    except Exception as error:
+        raise _broken(source, error) from None
+    if name not in known:
+        raise ModelError(
+            f"{_versions()} has no model '{name}'{nearest(name, known)}; it has: {listed(known)}"
+        )
+    try:
+        # 0.2.3 and older have no postures, and the oldest no build_kwargs
+        postures = hasattr(package, "list_postures") and package.list_postures(name)
+        return package.load_spec(name, **({"build_kwargs": {"postures": True}} if postures else {}))
+    except Exception as error:
+        raise _broken(source, error) from None
+
+
+def myo_model(source: str) -> mujoco.MjModel:
+    """Return the compiled model of "myo_sim:NAME"; errors as of `myo_spec`."""
+    spec = myo_spec(source)
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _broken(source, error) from None
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return " (did you mean ...?)" with the known names that resemble a name, the best first, or an empty string."""
+    by_lower = {each.lower(): each for each in known}
+    close = [by_lower[each] for each in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.6)]
+    return f" (did you mean {' or '.join(repr(each) for each in close)}?)" if close else ""
+
+
+def _broken(source: str, error: Exception) -> ModelError:
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    return ModelError(
+        f"'{source}' cannot be loaded by {_versions()} with MuJoCo {mujoco.__version__} ({reason}). Versions that fit: "
+        "myo-sim 0.2.4 with MuJoCo 3, myo-sim 0.2.3 with MuJoCo 3 or 4; to install it again: pip install "
+        "--force-reinstall --no-deps 'myo-sim==0.2.3'"
+    )
+
+
+def _versions() -> str:
+    try:
+        return f"myo-sim {importlib.metadata.version('myo-sim')}"
+    except importlib.metadata.PackageNotFoundError:
+        return "myo-sim (of unknown version)"

@@ -1,0 +1,154 @@
+"""Angles that a user gives: with their unit, and whether they can be meant for a joint.
+
+Degrees that are taken as radians are the most common mistake with angles: 90 rad are 14 turns.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mjwrap.errors import MjwrapError, ModelError, SignalError, TableError
+from mjwrap.files import Table
+from mjwrap.mjcf import name_of
+
+BEYOND = math.pi  # [rad] no position of a hinge with a range can be meant that is further outside
+TURNS = 4.0 * math.pi  # [rad] a hinge without a range seldom turns further
+_DEGREES = re.compile(r"(deg|°)$")
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+class Angle(float):
+    """A position [rad] that was given in degrees, so it fits hinges only."""
+
+
+def position(text: str) -> float:
+    """Return a position from "0.5" [rad or m], or "90deg" or "90°" as an `Angle` [rad]; `ValueError` for other text."""
+    number, found = _DEGREES.subn("", text.strip())
+    return Angle(math.radians(float(number))) if found else float(number)
+
+
+def pattern_in_radians(text: str) -> tuple[str, bool]:
+    """Return a pattern of a prescribed motion with its angles in rad, and whether some were in degrees.
+
+    A number alone is a constant. Angles are LEVEL, AMPLITUDE and OFFSET; `SignalError` where another value, such as a
+    frequency, is in degrees.
+    """
+    try:
+        alone = position(text)
+        return f"constant:{float(alone)!r}", isinstance(alone, Angle)
+    except ValueError:
+        pass
+    kind, _, rest = text.partition(":")
+    parts = rest.split(",")
+    given = [_DEGREES.search(part.strip()) is not None for part in parts]
+    if not any(given):
+        return text, False
+    if any(given[k] for k in range(len(parts)) if k not in (0, 2)):
+        raise SignalError(f"'{text}': only a level, an amplitude or an offset can be in degrees")
+    try:
+        parts = [repr(float(position(part))) if deg else part for part, deg in zip(parts, given, strict=True)]
+    except ValueError:
+        raise SignalError(f"'{text}': write an angle in degrees like 90deg") from None
+    return f"{kind}:{','.join(parts)}", True
+
+
+def check_position(
+    model: mujoco.MjModel, joint: int, values: ArrayLike, entry: str, error: type[MjwrapError] = ModelError
+) -> None:
+    """Check positions [rad or m] of a hinge or slide that a user gives.
+
+    Raises `error`, which begins with `entry`, for a position half a turn or more outside a hinge's range, and for
+    degrees about a slide. Warns of other positions outside the range, and of more than two turns without a range.
+    """
+    given = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    turning, limited = int(model.jnt_type[joint]) == _HINGE, bool(model.jnt_limited[joint])
+    name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+    if not turning and isinstance(values, Angle):
+        raise error(f"{entry}: joint '{name}' is a slide: give its position in m, without deg")
+    low, high = (float(x) for x in model.jnt_range[joint])
+    outside = np.maximum(low - given, given - high) if limited else np.full(given.shape, -np.inf)
+    k = int(np.argmax(outside if limited else np.abs(given)))
+    value, unit = float(given[k]), "rad" if turning else "m"
+    instead = "" if isinstance(values, Angle) else f"; if degrees are meant, write {value:g}deg"
+    if turning and limited and outside[k] > BEYOND:
+        raise error(
+            f"{entry}: {value:g} rad are {abs(value) / (2.0 * math.pi):.3g} turns, far outside the range of joint "
+            f"'{name}', {low:.4g} to {high:.4g} rad{instead}"
+        )
+    if limited and outside[k] > 0.0:
+        warnings.warn(
+            f"{entry} lies outside the joint's range, {low:g} to {high:g} {unit}" + instead * turning,
+            stacklevel=3,
+        )
+    elif turning and not limited and abs(value) > TURNS:
+        warnings.warn(
+            f"{entry}: {value:g} rad are {abs(value) / (2.0 * math.pi):.3g} turns of joint '{name}'{instead}",
+            stacklevel=3,
+        )
+
+
+def check_range(model: mujoco.MjModel, joint: int, low: float, high: float) -> None:
+    """Raise `ModelError` for a range [rad] of a hinge that only degrees can explain.
+
+    That is one that goes half a turn or more beyond the model's own range, or more than two turns without one.
+    """
+    name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+    entry = f"range of joint '{name}'"
+    for end in (low, high):
+        if isinstance(end, Angle) and int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE):
+            raise ModelError(f"{entry}: it is a slide: give its range in m, without deg")
+    if int(model.jnt_type[joint]) != _HINGE or isinstance(low, Angle) or isinstance(high, Angle):
+        return
+    own = [float(x) for x in model.jnt_range[joint]]
+    limited = bool(model.jnt_limited[joint])
+    if (limited and max(own[0] - low, high - own[1]) > BEYOND) or (not limited and high - low > TURNS):
+        turns = (high - low) / (2.0 * math.pi)
+        beside = f", and the model's range is {own[0]:.4g} to {own[1]:.4g} rad" if limited else ""
+        raise ModelError(
+            f"{entry}: {low:g} to {high:g} rad are {turns:.3g} turns{beside}; if degrees are meant, write "
+            f"{name}={low:g}deg,{high:g}deg"
+        )
+
+
+def check_column(model: mujoco.MjModel, joint: int, table: Table, column: str, own: bool = False) -> None:
+    """Check the positions of a hinge in a column of a table, in the unit that its header gives.
+
+    own: a column of a table that mjwrap wrote, in rad, whose motion may have gone anywhere. Raises `TableError` if the
+    positions are half a turn or more outside the joint's range, unless `own`; else warns, and also of more than two
+    turns of a hinge without a range, which a wheel may make.
+    """
+    if int(model.jnt_type[joint]) != _HINGE:
+        return
+    values = np.radians(table[column]) if table.in_degrees else table[column]
+    low, high = (float(x) for x in model.jnt_range[joint])
+    limited = bool(model.jnt_limited[joint])
+    outside = np.maximum(low - values, values - high) - BEYOND if limited else np.abs(values) - TURNS
+    if not len(values) or not np.nanmax(outside) > 0.0:
+        return
+    k = int(np.nanargmax(outside))
+    name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+    range_ = (
+        f"joint '{name}' has a range of {low:.4g} to {high:.4g} rad"
+        if limited
+        else f"joint '{name}' has no range"
+    )
+    turns = abs(float(values[k])) / (2.0 * math.pi)
+    instead = (
+        "its header says that it is in degrees (inDegrees=yes)"
+        if table.in_degrees
+        else "if the table is in degrees, write inDegrees=yes into its header (in a CSV file: a first line '# "
+        "inDegrees=yes')"
+    )
+    words = (
+        f"'{table.source}', column '{column}': {table[column][k]:g} at time {table.time[k]:g} s is {turns:.3g} turns, "
+        f"and {range_}; {instead}"
+    )
+    if limited and not own:
+        raise TableError(words)
+    warnings.warn(words, stacklevel=3)

@@ -1,0 +1,60 @@
+"""Choose independent coordinates of a model by name, and compute moment arms about them, couplings included."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import GeometryError
+from mjwrap.mjcf import name_of, names
+from mjwrap.mjcf.couplings import CoupledJoints
+
+Array = NDArray[np.float64]
+_JOINT = mujoco.mjtObj.mjOBJ_JOINT
+_SCALAR = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+
+
+def independent_coordinates(model: mujoco.MjModel) -> list[str]:
+    """Return the names of all hinges and slides that follow no other joint, in the model's order."""
+    leader = CoupledJoints(model).leader
+    return [
+        name_of(model, _JOINT, joint)
+        for joint in range(model.njnt)
+        if int(model.jnt_type[joint]) in _SCALAR and joint not in leader
+    ]
+
+
+def moment_arms(
+    model: mujoco.MjModel, jacobian: Array, qpos: Array, coordinates: Iterable[str] | None
+) -> Array:
+    """Return −J N (n, k) [m] at a pose qpos (nq,), from J = ∂l/∂q (n, nv); see `MuscleSystem.moment_arms`."""
+    couplings = CoupledJoints(model)
+    given = independent_coordinates(model) if coordinates is None else coordinates
+    dofs = _dofs(model, couplings, [given] if isinstance(given, str) else list(given))
+    columns = np.searchsorted(couplings.independent, dofs)
+    return -jacobian @ couplings.matrix(qpos)[:, columns]
+
+
+def _dofs(model: mujoco.MjModel, couplings: CoupledJoints, coordinates: list[str]) -> NDArray[np.int64]:
+    """Return the degrees of freedom (k,) of joints by name; `GeometryError` for one that is not independent."""
+    known = names(model, _JOINT, model.njnt)
+    found: list[int] = []
+    for name in coordinates:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known)
+            meant = f"did you mean {' or '.join(near)}" if near else f"joints: {', '.join(known) or 'none'}"
+            raise GeometryError(f"no joint '{name}' for a moment arm; {meant}")
+        joint = known.index(name)
+        if joint in couplings.leader:
+            head = couplings.head(joint)
+            instead = f"give that joint, '{known[head]}'" if head >= 0 else "there is no moment arm about it"
+            follows = f"follows '{known[head]}'" if head >= 0 else "is held at a position"
+            raise GeometryError(f"joint '{name}' {follows} by an equality of the model: {instead}")
+        first = int(model.jnt_dofadr[joint])
+        count = {int(mujoco.mjtJoint.mjJNT_FREE): 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}
+        found += range(first, first + count.get(int(model.jnt_type[joint]), 1))
+    return np.array(found, dtype=np.int64)

@@ -1,0 +1,242 @@
+"""One muscle of a system by name, and systems and muscles as a notebook shows them."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import Any, Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap import html, plots
+from mjwrap.errors import MjwrapError, StateError
+from mjwrap.mjcf import MuscleDeclaration, Route
+from mjwrap.mjcf.names import name_of
+from mjwrap.muscles.laws import Law
+from mjwrap.paths import Status
+from mjwrap.paths.pictures import flattest_view
+
+Array = NDArray[np.float64]
+_SITE, _GEOM = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
+SHOWN = 500  # muscles in a notebook's table
+FEW = 6  # names in a repr
+MOVED = 1e-12  # [m, 1] a smaller moment arm is none
+
+
+class Muscles(Protocol):
+    """What a view needs of the results of a system; see `Results`."""
+
+    model: mujoco.MjModel
+    declarations: list[MuscleDeclaration]
+    native: dict[str, str]
+
+    @property
+    def n(self) -> int: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def length(self) -> Array: ...
+    @property
+    def velocity(self) -> Array: ...
+    @property
+    def tension(self) -> Array: ...
+    @property
+    def activation(self) -> Array: ...
+    @property
+    def fiber_length(self) -> Array: ...
+    @property
+    def status(self) -> NDArray[np.int64]: ...
+    @property
+    def held(self) -> NDArray[np.bool_]: ...
+    def points(self, i: int, spacing: float | None = None) -> Array: ...
+    def contact_points(self, i: int) -> Array: ...
+    def forces(self, i: int) -> list[tuple[int, Array, Array]]: ...
+    def reason(self, i: int) -> str: ...
+
+
+class MuscleView:
+    """One muscle of a `MuscleSystem` or of the plugin's `Muscles`: `muscles["BRA"]`.
+
+    Its numbers are always those of the last evaluation, as in the arrays of the system.
+
+    Attributes:
+        name: name of the muscle.
+        index: its place in the arrays of the system.
+    """
+
+    def __init__(self, muscles: Muscles, index: int) -> None:
+        self._muscles = muscles
+        self.index = index
+        self.name: str = muscles.declarations[index].name
+
+    @property
+    def length(self) -> float:
+        """Musculotendon length [m]."""
+        return float(self._muscles.length[self.index])
+
+    @property
+    def velocity(self) -> float:
+        """Lengthening speed [m/s]."""
+        return float(self._muscles.velocity[self.index])
+
+    @property
+    def tension(self) -> float:
+        """Tension [N]."""
+        return float(self._muscles.tension[self.index])
+
+    @property
+    def activation(self) -> float:
+        """Activation."""
+        return float(self._muscles.activation[self.index])
+
+    @property
+    def fiber_length(self) -> float:
+        """Fibre length [m], along the fibre; 0 for a law without fibres."""
+        return float(self._muscles.fiber_length[self.index])
+
+    @property
+    def status(self) -> Status:
+        """Status of the path."""
+        return Status(int(self._muscles.status[self.index]))
+
+    @property
+    def held(self) -> bool:
+        """Whether the muscle has no path and keeps its last valid length, velocity and tension."""
+        return bool(self._muscles.held[self.index])
+
+    @property
+    def reason(self) -> str:
+        """Why the muscle last had no path; empty if it always had one."""
+        return self._muscles.reason(self.index)
+
+    @property
+    def declaration(self) -> MuscleDeclaration:
+        """What the model declares: routes, law, actuator."""
+        return self._muscles.declarations[self.index]
+
+    @property
+    def parameters(self) -> Law:
+        """The law's dataclass with its parameters."""
+        return self.declaration.parameters
+
+    @property
+    def route(self) -> str:
+        """The sites and geoms of the route by name."""
+        return " | ".join(route_text(self._muscles.model, route) for route in self.declaration.routes)
+
+    def points(self, spacing: float | None = None) -> Array:
+        """Return the polyline (m, 3), world [m], as `MuscleSystem.points`."""
+        return self._muscles.points(self.index, spacing)
+
+    def contact_points(self) -> Array:
+        """Return the first and last contact point (k, 2, 3) of every obstacle that is touched, world [m]."""
+        return self._muscles.contact_points(self.index)
+
+    def forces(self) -> list[tuple[int, Array, Array]]:
+        """Return the muscle's forces: (body id, point (3,) [m], force (3,) [N]), world."""
+        return self._muscles.forces(self.index)
+
+    def moment_arms(self, data: mujoco.MjData) -> dict[str, float]:
+        """Return the moment arm [m] about each independent joint that moves the muscle, by name, at `data`.
+
+        As `MuscleSystem.moment_arms`. Raises `StateError` for the plugin's `Muscles`, which have none.
+        """
+        system: Any = self._muscles
+        if not hasattr(system, "moment_arms"):
+            raise StateError(
+                "the plugin's Muscles have no moment arms; a MuscleSystem of the model without it has"
+            )
+        arms = system.moment_arms(data)[self.index]
+        return {n: float(a) for n, a in zip(system.coordinates, arms, strict=True) if abs(a) > MOVED}
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the path at the last evaluation in space with matplotlib, and return the axes.
+
+        axes: 3D axes to draw into; None for a new figure. Raises `MissingPackageError` without matplotlib.
+        """
+        marks = self.contact_points().reshape(-1, 3)
+        return plots.draw_paths([(self.name, self.points())], marks, [], axes)
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name} {value}" for name, value in _numbers(self)[:4])
+        return f"MuscleView({self.name!r}, {self.status.name}, {numbers})"
+
+    def _repr_html_(self) -> str:
+        law = self.parameters
+        given = fields(law) if is_dataclass(law) else ()
+        parameters = [(field.name, getattr(law, field.name)) for field in given]
+        facts = [("status", self.status.name), *_numbers(self), ("route", self.route), ("law", law.law)]
+        shown = html.facts([*facts, *parameters], f"muscle {self.name}")
+        points = self.points()
+        good = points[np.isfinite(points).all(axis=1)]
+        if len(good) < 2:
+            return shown
+        view, contacts = flattest_view(good), self.contact_points().reshape(-1, 3)
+        marks = np.vstack([good[[0, -1]], contacts]) @ view
+        return shown + html.drawing([(points @ view).tolist()], marks.tolist())
+
+
+def _numbers(muscle: MuscleView) -> list[tuple[str, str]]:
+    return [
+        ("length", f"{muscle.length:.6g} m"),
+        ("velocity", f"{muscle.velocity:.4g} m/s"),
+        ("tension", f"{muscle.tension:.5g} N"),
+        ("activation", f"{muscle.activation:.4g}"),
+        ("fibre length", f"{muscle.fiber_length:.6g} m"),
+    ]
+
+
+def route_text(model: mujoco.MjModel, route: Route) -> str:
+    """Return the stops of a route by name."""
+    stops = [name_of(model, _SITE, route.origin)]
+    for node in route.nodes:
+        if node.surface is None:
+            stops.append(name_of(model, _SITE, node.site))
+        else:
+            hint = f", side {name_of(model, _SITE, node.hint_site)}" if node.hint_site >= 0 else ""
+            kind = type(node.surface).__name__.lower()
+            stops.append(f"{name_of(model, _GEOM, node.geom)} ({kind}{hint}{', held inside' * node.inside})")
+    stops.append(name_of(model, _SITE, route.insertion))
+    return (f"{route.weight:g} × " if route.weight != 1.0 else "") + " > ".join(stops)
+
+
+def system_text(muscles: Muscles) -> str:
+    """Return a line about a system: its muscles, those without a path, and the actuators left to MuJoCo."""
+    names = muscles.names
+    told = [", ".join(names[:FEW]) + ", ..." * (len(names) > FEW)] if names else []
+    failed = [name for name, code in zip(names, _status(muscles), strict=True) if code]
+    if failed:
+        told.append(f"without a path: {', '.join(failed[:FEW])}{', ...' * (len(failed) > FEW)}")
+    if muscles.native:
+        told.append(f"{len(muscles.native)} left to MuJoCo")
+    plural = "s" * (len(names) != 1)
+    return f"{type(muscles).__name__}({len(names)} muscle{plural}{': ' * bool(told)}{'; '.join(told)})"
+
+
+def system_html(muscles: Muscles) -> str:
+    """Return a system as a notebook shows it: a row for each muscle, and the actuators left to MuJoCo."""
+    heads = ("muscle", "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
+    rows: list[list[str]] = []
+    status = _status(muscles)
+    try:
+        columns = [muscles.length, muscles.velocity, muscles.tension, muscles.activation]
+    except MjwrapError:  # of the plugin, before the first step
+        columns = [np.full(muscles.n, np.nan)] * 4
+    for i, muscle in enumerate(muscles.declarations[:SHOWN]):
+        route = " | ".join(route_text(muscles.model, route) for route in muscle.routes)
+        path = Status(int(status[i])).name
+        rows.append([muscle.name, muscle.law, path, *(f"{column[i]:.5g}" for column in columns), route])
+    found = html.table(heads, rows, system_text(muscles))
+    if muscles.native:
+        found += html.table(("left to MuJoCo", "reason"), list(muscles.native.items()))
+    return found
+
+
+def _status(muscles: Muscles) -> list[int]:
+    try:
+        return muscles.status.tolist()
+    except MjwrapError:
+        return [0] * muscles.n
