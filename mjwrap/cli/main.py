@@ -24,6 +24,7 @@ COMMANDS = {
     "replay": "show a recording, or make one from a table of states",
     "warmup": "compile everything in advance, so that later commands start faster",
 }
+EVALUATING = ("run", "compare", "plot", "inspect", "check", "warmup")  # compute forces of muscles
 HELP = """usage: mjwrap COMMAND ...
        mjwrap COMMAND --help
        mjwrap --version
@@ -98,4 +99,8 @@ def _execute(name: str, arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     options.given = list(arguments)  # as typed, for outputs that quote the command
     note_inputs(console.inputs(options))
+    if name in EVALUATING:
+        from mjwrap.cli.common.meanwhile import start_laws  # loads numba
+
+        start_laws()
     return command.execute(options)

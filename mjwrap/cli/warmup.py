@@ -14,16 +14,15 @@ import argparse
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
-from numba.core import event
 
 import mjwrap as mw
 from mjwrap.cli.common.arguments import MODEL_HELP, add_json
+from mjwrap.cli.common.meanwhile import CompileCount, OtherProcess, can_help, laws
 from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels.compilation import cache_folders
@@ -61,19 +60,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "write what was compiled, how long it took, and its folder")
 
 
-class _Count(event.Listener):
-    """Count the functions that are compiled, not loaded."""
-
-    def __init__(self) -> None:
-        self.compiled = 0
-
-    def on_start(self, event: Any) -> None:
-        self.compiled += 1
-
-    def on_end(self, event: Any) -> None:
-        pass
-
-
 @dataclass(frozen=True)
 class WarmupSettings:
     """The settings of `mjwrap warmup`: a model to compile for, and a file for the report ("-": standard output)."""
@@ -91,35 +77,61 @@ def warm_up(settings: WarmupSettings) -> int:
     """Compile, and report what was compiled and the folder of the machine code."""
     report = Report(settings.json)
     model = load(settings.model) if settings.model else None
-    count = _Count()
-    event.register("numba:compile", count)
-    steps: dict[str, Callable[[], object]] = {
-        "paths": paths, "muscles": muscles, "plugin": plugin, "recording": recording,
-    }  # fmt: skip
+    parts: list[Part] = []
+
+    def done(part: Part) -> None:
+        told = part.left_out or f"{counted(part.compiled, 'function')} compiled"
+        report.say(f"{part.part}: {told}, {part.seconds:.1f} s")
+        parts.append(part)
+
+    done(compile_part("first step", first_step))
+    started = time.perf_counter()
+    other = OtherProcess(f"{__name__}:muscles") if can_help() else None
+    for work in (paths, plugin, recording):
+        done(compile_part(work.__name__, work))
+    compiled = other.compiled() if other is not None else None
+    if compiled is not None:
+        done(Part("muscles", compiled, time.perf_counter() - started, ""))
+    else:
+        done(compile_part("muscles", muscles))
     if settings.model and model is not None:
-        steps[settings.model] = lambda: evaluate(model)
-    parts = []
-    try:
-        for name, step in steps.items():
-            before, started = count.compiled, time.perf_counter()
-            left_out = step()
-            seconds = time.perf_counter() - started
-            part = {
-                "part": name,
-                "compiled": count.compiled - before,
-                "seconds": seconds,
-                "left_out": left_out,
-            }
-            told = left_out or f"{counted(count.compiled - before, 'function')} compiled"
-            report.say(f"{name}: {told}, {seconds:.1f} s")
-            parts.append(part)
-    finally:
-        event.unregister("numba:compile", count)
+        done(compile_part(settings.model, lambda: evaluate(model)))
     folder = cache_folders.base()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-    report.say(f"{'compiled' if count.compiled else 'nothing to compile'}; {size / 1e6:.0f} MB in {folder}")
-    report.finish({"parts": parts, "compiled": count.compiled, "folder": str(folder), "bytes": size})
+    total = sum(part.compiled for part in parts)
+    report.say(f"{'compiled' if total else 'nothing to compile'}; {size / 1e6:.0f} MB in {folder}")
+    values = {
+        "parts": [asdict(part) for part in parts],
+        "compiled": total,
+        "folder": str(folder),
+        "bytes": size,
+    }
+    report.finish(values)
     return 0
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the work: how many functions were compiled, in how many seconds, and why it was left out, if so."""
+
+    part: str
+    compiled: int
+    seconds: float
+    left_out: str
+
+
+def compile_part(name: str, work: Callable[[], str | None]) -> Part:
+    """Do a part of the work, which returns why it is left out, if so."""
+    started = time.perf_counter()
+    with CompileCount() as count:
+        left_out = work() or ""
+    return Part(name, count.compiled, time.perf_counter() - started, left_out)
+
+
+def first_step() -> None:
+    """Take a step with a muscle over a cylinder, which needs what every other part needs."""
+    model = mujoco.MjModel.from_xml_string(SCENE.replace("ellipsoid", "cylinder"))
+    mw.MuscleSystem(model).step(mujoco.MjData(model))
 
 
 def paths() -> None:
@@ -143,8 +155,7 @@ def paths() -> None:
 def muscles() -> None:
     """Evaluate and step a MuscleSystem, and simulate a single muscle."""
     evaluate(mujoco.MjModel.from_xml_string(SCENE))
-    law = mw.DeGrooteFregly2016(500.0, 0.1, 0.2, tendon="elastic")
-    mw.simulate_muscle(law, [0.0, 0.01, 0.02], 0.3, excitation=0.5)
+    laws()
 
 
 def evaluate(model: mujoco.MjModel) -> None:

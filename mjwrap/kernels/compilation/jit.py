@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeVar
 
 import numba
-from numba.core import event, types
+from numba.core import types
 
-from mjwrap.kernels.compilation import module_caches, self_test
+from mjwrap.kernels.compilation import module_caches, progress, self_test
 from mjwrap.kernels.compilation.cache_folders import config
 
-_OURS = "mjwrap.kernels."
 F = TypeVar("F", bound=Callable[..., Any])
-_NOTICE = "mjwrap: compiling its kernels{}, once for this machine and version ..."
-_FIRST = " (about half a minute)"
-_FURTHER = " that were not used before ('mjwrap warmup' compiles all of them)"
 # The options of `linking.py` that numba.njit has too, for a numba with which `linking.py` does not work.
 _PLAIN: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "cache": True}
 
 
-class _Announcer(event.Listener):
-    """Tells the user, once a process, that kernels are being compiled rather than loaded."""
-
-    def __init__(self) -> None:
-        self.silent = False
-
-    def on_start(self, event: Any) -> None:
-        dispatcher = event.data.get("dispatcher") if event.data else None
-        function = getattr(dispatcher, "py_func", None)
-        if not self.silent and (getattr(function, "__module__", None) or "").startswith(_OURS):
-            self.silent = True
-            how = _FURTHER if module_caches.is_anything_kept() else _FIRST
-            print(_NOTICE.format(how), file=sys.stderr, flush=True)
-
-    def on_end(self, event: Any) -> None:
-        pass
-
-
-event.register("numba:compile", _Announcer())
+progress.register()
 
 
 def jit(function: F, kind: str = "Kernel", *further: Any, **options: bool) -> F:

@@ -29,7 +29,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.typing import templates
 
-from mjwrap.kernels.compilation.pipeline import KernelCompiler, definitions_remembered
+from mjwrap.kernels.compilation.pipeline import KernelCompiler, faster
 
 Dispatcher: Any = CPUDispatcher
 OPTIONS: dict[str, Any] = {
@@ -44,16 +44,6 @@ OPTIONS: dict[str, Any] = {
 
 SIGNAL_DELAY = 0.05  # [s] after which a signal is delivered that came during a deferred compilation
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-
-
-def _debug(k):
-    import sys
-
-    f = sys._getframe(2)
-    with open("/tmp/entries.txt", "a") as o:
-        o.write(
-            f"{k.py_func.__module__} {k.py_func.__name__} {type(k).__name__} {f.f_code.co_filename}:{f.f_lineno}\n"
-        )
 
 
 class Kernel(Dispatcher):
@@ -74,7 +64,6 @@ class Kernel(Dispatcher):
         """Call from Python."""
         if self._wrapped is None:
             self._wrapped = self._copy()
-            _debug(self)
         return self._wrapped(*args)
 
     def _copy(self) -> Any:
@@ -102,7 +91,7 @@ class Kernel(Dispatcher):
     def compile(self, sig: Any) -> Any:
         """Compile or load a version, as numba does but for its clocks, which cost a tenth of the time."""
         args = tuple(sigutils.normalize_signature(sig)[0])
-        with global_compiler_lock, definitions_remembered(), self._compiling_counter:
+        with global_compiler_lock, faster(), self._compiling_counter:
             if args not in self.overloads:
                 found = self._cache.load_overload(sig, self.targetctx)
                 if found is None:
