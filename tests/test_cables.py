@@ -236,6 +236,7 @@ COMMANDS = {
     "check": ["--poses", "1", "--samples", "3"],
     "compare": ["--samples", "3", "--bases", "0", "--duration", "0.02"],
     "run": ["--duration", "0.02"],
+    "plot": ["--joint", "#2", "--range", "-30deg,30deg", "--muscle", "*", "--samples", "3", "--csv"],
 }
 SAVED = ("wrench.xml", "wrench.mjb", "transmission.xml", "transmission.mjb")
 
@@ -256,9 +257,10 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", SAVED)
 def test_a_saved_installed_model_opens_in_every_command(
-    name: str, command: str, saved: dict[str, Path], capsys: pytest.CaptureFixture[str]
+    name: str, command: str, saved: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ran = run_here(command, capsys, saved[name], *COMMANDS[command])
+    table = [tmp_path / "t.csv"] if COMMANDS[command][-1:] == ["--csv"] else []
+    ran = run_here(command, capsys, saved[name], *COMMANDS[command], *table)
     assert ran.code == 0, ran.err
     assert "1 muscle and 4 cables" in ran.out
 

@@ -34,13 +34,14 @@ from pathlib import Path
 
 import mujoco
 
-from mjwrap import MuscleSystem, insert_xml, muscle_xml
+from mjwrap import insert_xml, muscle_xml
 from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.common.output import open_output, say
 from mjwrap.errors import ModelError
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf.parameters import LAWS
 from mjwrap.runs.models import load
+from mjwrap.system import CableSystem
 
 MOVED = 1e-9  # [m] a smaller moment arm is none
 
@@ -160,8 +161,7 @@ def try_out(text: str, folder: Path, muscle: str) -> str:
     finally:
         os.unlink(name)
     data = mujoco.MjData(model)
-    muscles = MuscleSystem(model)
-    found = muscles[muscle]
+    found = CableSystem(model)[muscle]
     arms = found.moment_arms(data)
     parts = [f"{joint} {1e3 * arm:.4g} mm" for joint, arm in arms.items() if abs(arm) > MOVED]
     if found.status:
