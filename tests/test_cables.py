@@ -86,6 +86,16 @@ def test_the_finger_moves_in_python_as_in_the_plugin(integrator: str) -> None:
     assert not muscles.failures.any()
 
 
+def test_cables_are_called_so_in_notebooks() -> None:
+    robot, finger = CableSystem(model_of(CABLES)), CableSystem(mujoco.MjModel.from_xml_path(FINGER))
+    assert repr(robot).startswith("CableSystem(1 muscle and 4 cables: winch, ")
+    assert repr(CableSystem(model_of(CABLES), transmission=True)) == repr(robot)
+    assert "<th>muscle</th>" in robot._repr_html_()
+    assert "<th>cable</th>" in finger._repr_html_()
+    assert "cable winch</caption>" in robot["winch"]._repr_html_()
+    assert "muscle flexor</caption>" in robot["flexor"]._repr_html_()
+
+
 def test_without_cables_it_is_a_muscle_system() -> None:
     """The same bits."""
     path = str(ROOT / "models" / "elbow" / "elbow.xml")

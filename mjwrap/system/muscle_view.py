@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, Protocol
 
@@ -11,11 +12,12 @@ from numpy.typing import NDArray
 
 from mjwrap import html, plots
 from mjwrap.errors import MjwrapError, StateError
-from mjwrap.mjcf import MuscleDeclaration, Route
+from mjwrap.mjcf import MuscleDeclaration, Route, is_muscle
 from mjwrap.mjcf.names import name_of
-from mjwrap.muscles.laws import Law
+from mjwrap.muscles.laws import ActuatorForce, Law
 from mjwrap.paths import Status
 from mjwrap.paths.pictures import flattest_view
+from mjwrap.text import counted_paths
 
 Array = NDArray[np.float64]
 _SITE, _GEOM = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
@@ -33,6 +35,7 @@ class Muscles(Protocol):
 
     @property
     def n(self) -> int: ...
+    def __iter__(self) -> Iterator[MuscleView]: ...
     @property
     def names(self) -> list[str]: ...
     @property
@@ -71,6 +74,11 @@ class MuscleView:
         self._muscles = muscles
         self.index = index
         self.name: str = muscles.declarations[index].name
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The model of the system."""
+        return self._muscles.model
 
     @property
     def length(self) -> float:
@@ -169,7 +177,8 @@ class MuscleView:
         given = fields(law) if is_dataclass(law) else ()
         parameters = [(field.name, getattr(law, field.name)) for field in given]
         facts = [("status", self.status.name), *_numbers(self), ("route", self.route), ("law", law.law)]
-        shown = html.facts([*facts, *parameters], f"muscle {self.name}")
+        kind = "cable" if _is_cable(self) else "muscle"
+        shown = html.facts([*facts, *parameters], f"{kind} {self.name}")
         points = self.points()
         good = points[np.isfinite(points).all(axis=1)]
         if len(good) < 2:
@@ -187,6 +196,12 @@ def _numbers(muscle: MuscleView) -> list[tuple[str, str]]:
         ("activation", f"{muscle.activation:.4g}"),
         ("fibre length", f"{muscle.fiber_length:.6g} m"),
     ]
+
+
+def _is_cable(muscle: MuscleView) -> bool:
+    """Return whether an actuator that is not a muscle pulls along the path."""
+    declared = muscle.declaration
+    return isinstance(declared.parameters, ActuatorForce) and not is_muscle(muscle.model, declared.actuator)
 
 
 def route_text(model: mujoco.MjModel, route: Route) -> str:
@@ -212,13 +227,14 @@ def system_text(muscles: Muscles) -> str:
         told.append(f"without a path: {', '.join(failed[:FEW])}{', ...' * (len(failed) > FEW)}")
     if muscles.native:
         told.append(f"{len(muscles.native)} left to MuJoCo")
-    plural = "s" * (len(names) != 1)
-    return f"{type(muscles).__name__}({len(names)} muscle{plural}{': ' * bool(told)}{'; '.join(told)})"
+    count = counted_paths(len(names), sum(map(_is_cable, muscles)))
+    return f"{type(muscles).__name__}({count}{': ' * bool(told)}{'; '.join(told)})"
 
 
 def system_html(muscles: Muscles) -> str:
     """Return a system as a notebook shows it: a row for each muscle, and the actuators left to MuJoCo."""
-    heads = ("muscle", "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
+    first = "cable" if muscles.n and all(map(_is_cable, muscles)) else "muscle"
+    heads = (first, "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
     rows: list[list[str]] = []
     status = _status(muscles)
     try:
