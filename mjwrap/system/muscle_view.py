@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, Protocol
 
@@ -35,7 +34,6 @@ class Muscles(Protocol):
 
     @property
     def n(self) -> int: ...
-    def __iter__(self) -> Iterator[MuscleView]: ...
     @property
     def names(self) -> list[str]: ...
     @property
@@ -74,11 +72,6 @@ class MuscleView:
         self._muscles = muscles
         self.index = index
         self.name: str = muscles.declarations[index].name
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The model of the system."""
-        return self._muscles.model
 
     @property
     def length(self) -> float:
@@ -177,7 +170,7 @@ class MuscleView:
         given = fields(law) if is_dataclass(law) else ()
         parameters = [(field.name, getattr(law, field.name)) for field in given]
         facts = [("status", self.status.name), *_numbers(self), ("route", self.route), ("law", law.law)]
-        kind = "cable" if _is_cable(self) else "muscle"
+        kind = "cable" if pulls_as_cable(self._muscles.model, self.declaration) else "muscle"
         shown = html.facts([*facts, *parameters], f"{kind} {self.name}")
         points = self.points()
         good = points[np.isfinite(points).all(axis=1)]
@@ -198,10 +191,13 @@ def _numbers(muscle: MuscleView) -> list[tuple[str, str]]:
     ]
 
 
-def _is_cable(muscle: MuscleView) -> bool:
-    """Return whether an actuator that is not a muscle pulls along the path."""
-    declared = muscle.declaration
-    return isinstance(declared.parameters, ActuatorForce) and not is_muscle(muscle.model, declared.actuator)
+def pulls_as_cable(model: mujoco.MjModel, muscle: MuscleDeclaration) -> bool:
+    """Return whether an actuator of MuJoCo's that is not a muscle pulls along the path of a muscle."""
+    return isinstance(muscle.parameters, ActuatorForce) and not is_muscle(model, muscle.actuator)
+
+
+def _cables(muscles: Muscles) -> int:
+    return sum(pulls_as_cable(muscles.model, muscle) for muscle in muscles.declarations)
 
 
 def route_text(model: mujoco.MjModel, route: Route) -> str:
@@ -227,13 +223,13 @@ def system_text(muscles: Muscles) -> str:
         told.append(f"without a path: {', '.join(failed[:FEW])}{', ...' * (len(failed) > FEW)}")
     if muscles.native:
         told.append(f"{len(muscles.native)} left to MuJoCo")
-    count = counted_paths(len(names), sum(map(_is_cable, muscles)))
+    count = counted_paths(len(names), _cables(muscles))
     return f"{type(muscles).__name__}({count}{': ' * bool(told)}{'; '.join(told)})"
 
 
 def system_html(muscles: Muscles) -> str:
     """Return a system as a notebook shows it: a row for each muscle, and the actuators left to MuJoCo."""
-    first = "cable" if muscles.n and all(map(_is_cable, muscles)) else "muscle"
+    first = "cable" if 0 < muscles.n == _cables(muscles) else "muscle"
     heads = (first, "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
     rows: list[list[str]] = []
     status = _status(muscles)
