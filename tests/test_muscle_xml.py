@@ -262,6 +262,16 @@ def test_the_command_names_mistakes(
     only_files(tmp_path)
 
 
+def test_a_model_by_name_is_copied_first(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, told in (
+        ("mjwrap:elbow", f"copy its file and name the copy: {ELBOW}"),
+        ("mjwrap:arm", "it has: elbow"),
+    ):
+        ran = run_here("init", capsys, name, "--muscle", "X", "--route", ROUTE, *SET)
+        assert ran.code == 2
+        assert told in ran.err
+
+
 def test_keyframes_of_the_model_stay_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A new actuator is the last one, so that MuJoCo fills its states with zeros."""
     keyed, out = tmp_path / "keyed.xml", tmp_path / "out.xml"

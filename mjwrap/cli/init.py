@@ -39,6 +39,7 @@ from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.common.output import open_output, say
 from mjwrap.errors import ModelError
 from mjwrap.files.atomic import PartFile
+from mjwrap.mjcf.named_models import OWN, own_file
 from mjwrap.mjcf.parameters import LAWS
 from mjwrap.runs.models import load
 from mjwrap.system import CableSystem
@@ -109,6 +110,11 @@ def _parameters(entries: Sequence[str]) -> dict[str, str]:
 
 def init(settings: InitSettings) -> int:
     """Write the declaration, test the model with it, report, and return the exit code."""
+    if settings.model.startswith(OWN):
+        raise UserError(
+            f"'{settings.model}' is a model that comes with mjwrap: copy its file and name the copy: "
+            f"{own_file(settings.model)}"
+        )
     if not settings.model.lower().endswith(".xml"):
         raise UserError(
             f"'{settings.model}' is not an MJCF file (.xml), into which a muscle could be written"
