@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import mujoco
@@ -14,6 +15,7 @@ from native_twins import EXPLICIT, INTEGRATORS
 
 import mjwrap as mw
 from mjwrap.checking import check_model
+from mjwrap.checking.mistakes import possible_mistakes
 from mjwrap.cli.inspect.cables import kind
 from mjwrap.comparison import compare_motion, compare_poses
 from mjwrap.mjcf import read_declarations
@@ -84,6 +86,42 @@ def test_the_finger_moves_in_python_as_in_the_plugin(integrator: str) -> None:
     np.testing.assert_allclose(data.qpos, other.qpos, rtol=0.0, atol=1e-11)
     assert np.abs(data.qpos - start).max() > 0.05
     assert not muscles.failures.any()
+
+
+def test_mistakes_call_a_cable_so_and_let_two_actuators_share_a_tendon() -> None:
+    for transmission in (False, True):
+        assert possible_mistakes(CableSystem(model_of(CABLES), transmission=transmission)) == []
+    copy = CABLES.replace(
+        "</tendon>",
+        '<spatial name="copy"><site site="front"/><site site="a"/></spatial></tendon>',
+    ).replace("</actuator>", '<motor name="copy" tendon="copy"/></actuator>')
+    (found,) = possible_mistakes(CableSystem(model_of(copy)))
+    assert str(found).startswith("cable 'copy' has the same sites and surfaces as cable 'leash'; ")
+
+
+def test_moment_arms_about_a_free_joint_have_their_units(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The leash pulls at (0, 0, 0.35) + (0.02, 0, -0.2), to (0, 1, 1.3): unit vector first, then torque in mm."""
+    path = tmp_path / "robot.xml"
+    path.write_text(CABLES)
+    ran = run_here("inspect", capsys, path, "--quick")
+    (line,) = [text for text in ran.out.splitlines() if text.startswith("  leash   #0[0]")]
+    pull = np.array([0.0, 1.0, 1.3]) - [0.02, 0.0, 0.15]
+    pull /= np.linalg.norm(pull)
+    turn = 1e3 * np.cross([0.02, 0.0, -0.25], pull)  # about the platform's origin
+    told = [float(word) for word in re.findall(r"#0\[\d\] (\S+?),", line)]
+    assert told == pytest.approx([*pull, *turn], rel=5e-3)
+
+
+def test_cables_are_called_so_in_notebooks() -> None:
+    robot, finger = CableSystem(model_of(CABLES)), CableSystem(mujoco.MjModel.from_xml_path(FINGER))
+    assert repr(robot).startswith("CableSystem(1 muscle and 4 cables: winch, ")
+    assert repr(CableSystem(model_of(CABLES), transmission=True)) == repr(robot)
+    assert "<th>muscle</th>" in robot._repr_html_()
+    assert "<th>cable</th>" in finger._repr_html_()
+    assert "cable winch</caption>" in robot["winch"]._repr_html_()
+    assert "muscle flexor</caption>" in robot["flexor"]._repr_html_()
 
 
 def test_without_cables_it_is_a_muscle_system() -> None:
@@ -236,6 +274,7 @@ COMMANDS = {
     "check": ["--poses", "1", "--samples", "3"],
     "compare": ["--samples", "3", "--bases", "0", "--duration", "0.02"],
     "run": ["--duration", "0.02"],
+    "plot": ["--joint", "#2", "--range", "-30deg,30deg", "--muscle", "*", "--samples", "3", "--csv"],
 }
 SAVED = ("wrench.xml", "wrench.mjb", "transmission.xml", "transmission.mjb")
 
@@ -256,9 +295,10 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", SAVED)
 def test_a_saved_installed_model_opens_in_every_command(
-    name: str, command: str, saved: dict[str, Path], capsys: pytest.CaptureFixture[str]
+    name: str, command: str, saved: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ran = run_here(command, capsys, saved[name], *COMMANDS[command])
+    table = [tmp_path / "t.csv"] if COMMANDS[command][-1:] == ["--csv"] else []
+    ran = run_here(command, capsys, saved[name], *COMMANDS[command], *table)
     assert ran.code == 0, ran.err
     assert "1 muscle and 4 cables" in ran.out
 

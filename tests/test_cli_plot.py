@@ -195,6 +195,10 @@ def test_many_muscles_have_a_panel_each(
             "0 to 90 rad are 14.3 turns.*elbow=0deg,90deg",
         ),
         (["--joint", "elbow", "--range", "0", "--csv", "{out}"], "write LOW,HIGH, such as"),
+        (
+            ["--joint", "elbow", "--quantity", "length", "fiber_length", "--csv", "{out}"],
+            "no muscle has a value of 'fiber_length': their laws have no fibres",
+        ),
         (["--joint", "elbow", "--activation", "2", "--csv", "{out}"], "between 0 and 1"),
         (["--joint", "elbow", "--csv", "{out}", "--states", "x.mot"], "--states needs a table: add --data"),
         (["--joint", "elbow", "--csv", "{out}", "--data", "{data}"], "write --data QUANTITY=FILE"),
@@ -235,6 +239,14 @@ def test_mistakes_are_named(
     assert len(ran.err.splitlines()) == 1
     assert re.search(told, ran.err), ran.err
     assert not files["out"].exists()
+
+
+def test_cables_have_no_tension_over_a_joint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out.csv"
+    ran = run_here("plot", capsys, "mjwrap:finger", "--joint", "mcp", "--quantity", "tension", "--csv", out)
+    assert ran.code == 2
+    assert "no muscle has a value of 'tension': cables have lengths and moment arms only" in ran.err
+    assert not out.exists()
 
 
 def test_a_table_in_another_unit_is_warned_of(

@@ -63,6 +63,17 @@ def test_joints_of_every_kind_are_told_and_the_rest_counted(tmp_path: Path) -> N
     )
 
 
+@pytest.mark.parametrize("mode", ["python", "transmission"])
+def test_a_servo_pulls_at_a_control_of_zero(mode: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The finger's servo, whose lengths begin at 70 mm, bends it; a motor's zero is no set point."""
+    ran = run_here("run", capsys, "mjwrap:finger", *SHORT, "--mode", mode)
+    assert ran.code == 0
+    assert (
+        "all controls were zero, which is a set point and not the absence of force for fdp: "
+        "add --excitation fdp=constant:0.105\n"
+    ) in ran.out
+
+
 def test_nothing_moves_because_all_controls_are_zero(tmp_path: Path) -> None:
     file = tmp_path / "m.xml"
     file.write_text(

@@ -5,6 +5,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from cable_robot import CABLES
 from cli_runs import ELBOW
 from test_cli_analysis import KNEE
 
@@ -66,6 +67,19 @@ def test_native_tendons_of_the_elbow_are_the_same() -> None:
     for quantity in ("length", "moment_arm"):
         assert curves.native[quantity] == pytest.approx(curves[quantity], abs=1e-14)
     assert np.array_equal(model.actuator_forcerange, limits)  # the model's own muscles still pull
+
+
+def test_cables_have_the_curves_of_mujocos_tendons() -> None:
+    """Lengths and moment arms alone: their forces follow from controls."""
+    curves = mw.curves(load(CABLES), "#2", ["*"], samples=9, span=(-0.6, 0.6), native=True)
+    assert curves.cables == ("winch", "brake", "tackle", "leash")
+    assert set(curves.names) > set(curves.cables)
+    for quantity in ("length", "moment_arm"):
+        assert curves[quantity] == pytest.approx(curves.native[quantity], abs=1e-12)
+    for i, name in enumerate(curves.names):
+        for quantity in ("tension", "moment", "active_fiber_force", "passive_fiber_force", "fiber_length"):
+            values = np.isnan(curves[quantity][:, i])
+            assert values.all() if name in curves.cables or quantity == "fiber_length" else not values.any()
 
 
 def test_joints_that_follow_move_along() -> None:

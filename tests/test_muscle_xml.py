@@ -6,12 +6,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from cli_runs import ELBOW, only_files, run_here
+from cli_runs import ELBOW, ROOT, only_files, run_here
 from test_curves import ARM
 
 import mjwrap as mw
+from mjwrap.files.columns import read_columns
 from mjwrap.surfaces.primitives import SURFACES
 
+FINGER = str(ROOT / "models" / "finger" / "finger.xml")
 TEXT = Path(ELBOW).read_text()
 MODEL = mujoco.MjModel.from_xml_path(ELBOW)
 HILL = {
@@ -176,7 +178,7 @@ def test_random_routes_are_read_back() -> None:
         (ROUTE, {"actuator": "BRX"}, "no actuator 'BRX'; actuators: TRIlong"),
         (ROUTE, {"actuator": "BRD"}, "actuator 'BRD' drives a muscle already, that of tuple 'mjwrap_BRD'"),
         (ROUTE, {"name": "two words"}, "contains a space"),
-        (ROUTE, {"name": "BRA"}, "has a actuator 'BRA' already: give its name as the actuator"),
+        (ROUTE, {"name": "BRA"}, "has the actuator 'BRA' already: give its name as the actuator"),
         (ROUTE, {"name": "x_torus_size"}, "contains 'torus_size', which is the name of a parameter"),
     ],
 )
@@ -223,11 +225,26 @@ def test_the_command_writes_a_whole_model(tmp_path: Path, capsys: pytest.Capture
     only_files(tmp_path, "new.xml")
 
 
+def test_the_command_adds_a_muscle_to_cables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In a folder that it makes; the cable that the model has on this tendon has the same path."""
+    out, table = tmp_path / "made" / "new.xml", tmp_path / "t.csv"
+    route = "fds_origin,mcp_drum:mcp_below,fds_via,fds_insertion"
+    ran = run_here("init", capsys, FINGER, "--muscle", "X", "--route", route, *SET, "-o", out)
+    assert (ran.code, ran.err) == (0, "")
+    assert run_here("plot", capsys, out, "--joint", "mcp", "--csv", table).out.startswith(
+        "new.xml: 1 muscle and 3 cables"
+    )
+    columns = read_columns(table)
+    for quantity in ("length:{}", "moment_arm:{}:mcp"):
+        twin = columns[quantity.format("fds")]
+        assert columns[quantity.format("X")] == pytest.approx(twin, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
         (["--set", "optimal_force"], "write KEY=VALUE"),
-        (["--set", "optimal_force=1", "--out", "{folder}/none/x.xml"], "none"),
+        (["--set", "optimal_force=1", "--out", "{model}/x.xml"], "elbow.xml' is not a folder"),
         (["--set", "optimal_force=1", "--out", "{folder}/x.mjb"], r"must end in \.xml"),
         (
             ["--set", "optimal_force=1", "--actuator", "BRA", "--law", "millard_2012"],
@@ -238,11 +255,21 @@ def test_the_command_writes_a_whole_model(tmp_path: Path, capsys: pytest.Capture
 def test_the_command_names_mistakes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
 ) -> None:
-    words = [word.format(folder=tmp_path) for word in arguments]
+    words = [word.format(folder=tmp_path, model=ELBOW) for word in arguments]
     ran = run_here("init", capsys, ELBOW, "--muscle", "X", "--route", ROUTE, *words)
     assert ran.code == 2
     assert re.search(told, ran.err)
     only_files(tmp_path)
+
+
+def test_a_model_by_name_is_copied_first(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, told in (
+        ("mjwrap:elbow", f"copy its file and name the copy: {ELBOW}"),
+        ("mjwrap:arm", "it has: elbow"),
+    ):
+        ran = run_here("init", capsys, name, "--muscle", "X", "--route", ROUTE, *SET)
+        assert ran.code == 2
+        assert told in ran.err
 
 
 def test_keyframes_of_the_model_stay_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ from mjwrap.comparison import Outcome, compare_poses, verdict
 from mjwrap.kernels import layout
 from mjwrap.mjcf.side_rules import running_side_rule, turn_by_rule
 from mjwrap.plugin import read, without_plugin
+from mjwrap.system import CableSystem
 
 Vector = np.ndarray
 RUNNING = running_side_rule()
@@ -232,15 +233,14 @@ def test_a_start_on_the_other_side_than_the_rule_means_is_put_to_mjwrap(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Paths of the other rule, under the name of this one."""
-    sound = mw.MuscleSystem
 
-    def turned(model: mujoco.MjModel, **options: object) -> mw.MuscleSystem:
-        muscles = sound(model)
-        wrong = sound(model, side_rule=OTHER)
+    def turned(model: mujoco.MjModel, **options: object) -> CableSystem:
+        muscles = CableSystem(model)
+        wrong = CableSystem(model, side_rule=OTHER)
         muscles._plan.node[:] = wrong._plan.node
         return muscles
 
-    monkeypatch.setattr("mjwrap.comparison.pose_comparison.MuscleSystem", turned)
+    monkeypatch.setattr("mjwrap.comparison.pose_comparison.CableSystem", turned)
     found = compare_poses(mujoco.MjModel.from_xml_string(SHOULDER), samples=11, bases=0)
     assert found.total(Outcome.WRONG_SIDE) > 5
     assert found.at_fault > 5

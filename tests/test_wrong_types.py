@@ -34,6 +34,7 @@ ALLOWED = {
     "Array": {"list", "array"},
     "tuple": {"list", "texts", "array"},
     "Sequence": {"list", "texts"},
+    "Iterable": {"list", "texts"},
     "Mapping": {"dict"},
     "bool": {"int"},
     "str": {"text"},
@@ -43,6 +44,7 @@ ALLOWED = {
     "MjData": {"MjData"},
     "MjSpec": {"MjSpec"},
     "MuscleSystem": {"MuscleSystem"},
+    "SupportsIndex": {"int", "negative"},
     "Results": {"MuscleSystem"},
     "PathSolution": {"PathSolution"},
     "Surface": {"surface"},
@@ -112,12 +114,15 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "ViaPoint": ((0.0, 0.0, 0.0),),
         "Video": (model, folder / "v.gif"),
         "basal_power": (70.0,),
+        "curves": (model, "elbow_flexion", "BRA"),
         "fit_fiber_and_slack": (0.2, 0.3),
         "hill_from_mujoco": (mw.MuJoCoMuscle(PRM, (0.1, 0.2), 1.0),),
         "implausible": (muscles,),
+        "insert_xml": ("<mujoco></mujoco>", "<custom/>"),
         "length_ranges": (muscles,),
         "load": (ELBOW,),
         "mesh_points": (mesh, "g"),
+        "muscle_xml": (model, "X", "BRA_origin,BRA_insertion"),
         "read_table": (folder / "t.csv",),
         "solve_path": (*ENDS, [BALL]),
         "solve_sweep": (*ENDS, [BALL], np.zeros((2, 1, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1, 1))),
@@ -138,7 +143,8 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "forward": (data,), "apply": (data,), "step": (data,), "reset": (data,), "length_jacobian": (data,),
         "length_jacobian_rate": (data,), "points": (0,), "forces": (0,), "contact_points": (0,), "reason": (0,),
         "unmet_hints": (0,), "index": ("BRA",), "branch": (data,), "poses": (data,), "polylines": (),
-        "energetics": (), "set_branch": (data, muscles.branch(data)),
+        "energetics": (), "set_branch": (data, muscles.branch(data)), "moment_arms": (data,),
+        "__getitem__": ("BRA",),
     }  # fmt: skip
     for name, arguments in methods.items():
         found[f"MuscleSystem.{name}"] = lambda n=name, a=arguments: Call(getattr(muscles, n), a)
@@ -200,8 +206,8 @@ def wrong(
 EXPENSIVE = {"ImplicitSurface", "ParametricSurface", "implausible", "length_ranges", "set_length_ranges"}
 EXPENSIVE |= {f"fit_{shape}" for shape in SHAPES}
 RESULTS = {  # that functions return; nobody makes them
-    "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "LengthRange", "MuscleTrial",
-    "ParameterReport", "PathSolution", "Status", "SweepSolution",
+    "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "JointCurves", "LengthRange",
+    "MuscleTrial", "ParameterReport", "PathSolution", "Status", "SweepSolution",
 }  # fmt: skip
 
 

@@ -34,13 +34,15 @@ from pathlib import Path
 
 import mujoco
 
-from mjwrap import MuscleSystem, insert_xml, muscle_xml
+from mjwrap import insert_xml, muscle_xml
 from mjwrap.cli.common.errors import UserError
 from mjwrap.cli.common.output import open_output, say
 from mjwrap.errors import ModelError
 from mjwrap.files.atomic import PartFile
+from mjwrap.mjcf.named_models import OWN, own_file
 from mjwrap.mjcf.parameters import LAWS
 from mjwrap.runs.models import load
+from mjwrap.system import CableSystem
 
 MOVED = 1e-9  # [m] a smaller moment arm is none
 
@@ -108,6 +110,11 @@ def _parameters(entries: Sequence[str]) -> dict[str, str]:
 
 def init(settings: InitSettings) -> int:
     """Write the declaration, test the model with it, report, and return the exit code."""
+    if settings.model.startswith(OWN):
+        raise UserError(
+            f"'{settings.model}' is a model that comes with mjwrap: copy its file and name the copy: "
+            f"{own_file(settings.model)}"
+        )
     if not settings.model.lower().endswith(".xml"):
         raise UserError(
             f"'{settings.model}' is not an MJCF file (.xml), into which a muscle could be written"
@@ -160,8 +167,7 @@ def try_out(text: str, folder: Path, muscle: str) -> str:
     finally:
         os.unlink(name)
     data = mujoco.MjData(model)
-    muscles = MuscleSystem(model)
-    found = muscles[muscle]
+    found = CableSystem(model)[muscle]
     arms = found.moment_arms(data)
     parts = [f"{joint} {1e3 * arm:.4g} mm" for joint, arm in arms.items() if abs(arm) > MOVED]
     if found.status:

@@ -13,6 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import mujoco
 
+from mjwrap import validation
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.parameters import (
@@ -80,6 +81,13 @@ def muscle_xml(
     Raises:
         ModelError: a name does not exist or is taken, or the route, the law or a parameter is not possible.
     """
+    validation.of_type(model, "MjModel", "model", ModelError)
+    for argument, text in (("name", name), ("route", route)):
+        validation.instance(text, str, argument, ModelError, "text")
+    for argument, optional in (("law", law), ("actuator", actuator)):
+        validation.optional(optional, str, argument, ModelError, "text")
+    validation.optional(parameters, Mapping, "parameters", ModelError, "a dict of values by name")
+    validation.flag(driven, "driven", ModelError)
     stops = read_route(model, route)
     numbers, words = _read_parameters(name, parameters or {})
     chosen = law or (choose_law({key: list(value) for key, value in numbers.items()}) if numbers else "")
@@ -95,6 +103,8 @@ def insert_xml(xml: str, fragment: str) -> str:
 
     Raises `ModelError` if the text has no such end.
     """
+    for argument, text in (("xml", xml), ("fragment", fragment)):
+        validation.instance(text, str, argument, ModelError, "text")
     place = xml.rfind("</mujoco>")
     if place < 0:
         raise ModelError("the text has no </mujoco>, before which a muscle could be inserted")
@@ -181,7 +191,7 @@ def _check_names(model: mujoco.MjModel, name: str, actuator: str | None, driven:
             continue
         if mujoco.mj_name2id(model, kind, wanted) >= 0:
             instead = ": give its name as the actuator of the muscle" if what == "actuator" else ""
-            raise ModelError(f"muscle '{name}': the model has a {what} '{wanted}' already{instead}")
+            raise ModelError(f"muscle '{name}': the model has the {what} '{wanted}' already{instead}")
     if actuator and mujoco.mj_name2id(model, OBJ.mjOBJ_ACTUATOR, actuator) < 0:
         known = (name_of(model, OBJ.mjOBJ_ACTUATOR, i) for i in range(model.nactuator))
         raise ModelError(f"muscle '{name}': no actuator '{actuator}'; actuators: {listed(known)}")

@@ -1,4 +1,4 @@
-"""Lengths, moment arms, fibres and forces of muscles over the position of one joint."""
+"""Lengths, moment arms, fibres and forces of muscles and cables over the position of one joint."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjwrap import html
+from mjwrap import html, validation
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.mjcf.names import listed, name_of
@@ -20,8 +20,8 @@ from mjwrap.model.takeover import Takeover
 from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.tendon_curves import native_tendons, tendon_rows
-from mjwrap.system import MuscleSystem
-from mjwrap.text import counted
+from mjwrap.system import CableSystem, is_cable
+from mjwrap.text import counted_paths
 
 Array = NDArray[np.float64]
 _SINGLE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -52,9 +52,10 @@ _FIBERS = {
 
 @dataclass(frozen=True, eq=False)
 class JointCurves:
-    """Curves of n muscles at T positions of a joint; `curves["moment_arm"]` is an array (T, n).
+    """Curves of n muscles and cables at T positions of a joint; `curves["moment_arm"]` is an array (T, n).
 
-    Values are NaN where a muscle has no path, and where its law has no such quantity.
+    Values are NaN where a muscle has no path, and where its law has no such quantity; cables have lengths and moment
+    arms only.
 
     Attributes:
         joint: name of the joint.
@@ -66,6 +67,7 @@ class JointCurves:
         native: the same of MuJoCo's own tendons, "length" and "moment_arm"; empty unless asked for, NaN for muscles
             whose route MuJoCo's tendon does not have.
         follows: the joint that this joint follows by an equality, or "". The sweep moves it alone then.
+        cables: names of those of the muscles that are cables: MuJoCo's own actuators pull them.
     """
 
     joint: str
@@ -75,12 +77,13 @@ class JointCurves:
     values: Mapping[str, Array]
     native: Mapping[str, Array]
     follows: str = ""
+    cables: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         ends = (self.at[0], self.at[-1])
         low, high = (f"{math.degrees(x):.4g}°" if self.turns else f"{x:.4g} m" for x in ends)
         names = ", ".join(self.names[:6]) + ", ..." * (len(self.names) > 6)
-        count = counted(len(self.names), "muscle")
+        count = counted_paths(len(self.names), len(self.cables))
         return f"JointCurves({self.joint} from {low} to {high}, {len(self.at)} positions, {count}: {names})"
 
     def _repr_html_(self) -> str:
@@ -88,7 +91,8 @@ class JointCurves:
         rows = [
             [name, *(_range(self.values[q][:, i]) for q, _ in shown)] for i, name in enumerate(self.names)
         ]
-        return html.table(["muscle", *(f"{q} [{unit}]" for q, unit in shown)], rows, repr(self))
+        head = "muscle" if len(self.cables) < len(self.names) else "cable"
+        return html.table([head, *(f"{q} [{unit}]" for q, unit in shown)], rows, repr(self))
 
     def __getitem__(self, quantity: str) -> Array:
         if quantity not in self.values:
@@ -113,7 +117,7 @@ def curves(
     native: bool = False,
     side_rule: int | None = None,
 ) -> JointCurves:
-    """Return lengths, moment arms, fibres and forces of muscles over the position of one joint.
+    """Return lengths, moment arms, fibres and forces of muscles and cables over the position of one joint.
 
     Joints that are coupled to the joint follow it, so that moment arms are those of the coupled motion: −dl/dq, with
     OpenSim's sign. Paths are followed from the reference pose, as in a motion. Muscles are at rest; fibres with elastic
@@ -122,7 +126,8 @@ def curves(
     Args:
         model: the model.
         joint: name of a hinge or slide.
-        muscles: patterns of names (`*` and `?` match any characters); None for all muscles that the joint moves.
+        muscles: patterns of names (`*` and `?` match any characters); None for all muscles and cables that the joint
+            moves.
         samples: number of positions, at least 2.
         span: first and last position [rad or m]; None for the joint's range.
         qpos: (nq,) pose of the other joints; None for qpos0.
@@ -136,13 +141,15 @@ def curves(
     Raises:
         ModelError: there is no such joint or muscle, the joint moves no muscle, or an argument is out of its range.
     """
-    if not isinstance(model, mujoco.MjModel):
-        raise ModelError(f"expected an MjModel (of an MjSpec: spec.compile()), not {type(model).__name__}")
+    validation.of_type(model, "MjModel", "model", ModelError)
+    validation.instance(joint, str, "joint", ModelError, "the name of a hinge or slide")
     index = _joint(model, joint)
-    _check(model, samples, span, qpos, activation)
+    samples = validation.whole(samples, 2, "samples", ModelError)
+    _check(model, muscles, span, qpos, activation)
+    validation.flag(native, "native", ModelError)
     with Takeover(model).original_limits():
         model = copy.copy(model)  # its actuators are disabled below
-    system = MuscleSystem(model, side_rule=side_rule)
+    system = CableSystem(model, side_rule=side_rule)
     base = np.array(model.qpos0 if qpos is None else qpos, dtype=np.float64)
     maker = PoseMaker(model, base)
     low, high = maker.span(index) if span is None else span
@@ -164,6 +171,9 @@ def curves(
     values = {"length": trace.length, "moment_arm": -trace.slope}
     values |= {name: np.array([row[name] for row in rows]) for name in rows[0]}
     values["moment"] = values["moment_arm"] * values["tension"]
+    cables = [is_cable(muscle) for muscle in system.declarations]
+    for name in set(QUANTITIES) - {"length", "moment_arm"}:
+        values[name][:, cables] = np.nan  # their forces follow from controls, not from an activation
     found = {name: np.where(bad, np.nan, values[name])[:, chosen] for name in QUANTITIES}
     own: dict[str, Array] = {}
     if native:
@@ -182,46 +192,55 @@ def curves(
         found,
         own,
         "" if leader is None else leader,
+        tuple(system.names[i] for i in chosen if cables[i]),
     )
 
 
 def _joint(model: mujoco.MjModel, name: str) -> int:
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if index < 0 or int(model.jnt_type[index]) not in _SINGLE:
-        known = (
-            name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j)
-            for j in range(model.njnt)
-            if int(model.jnt_type[j]) in _SINGLE
-        )
-        raise ModelError(f"no hinge or slide '{name}'; there are: {listed(known)}")
-    return index
+    single = {
+        name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j): j
+        for j in range(model.njnt)
+        if int(model.jnt_type[j]) in _SINGLE
+    }
+    if name not in single:
+        raise ModelError(f"no hinge or slide '{name}'; there are: {listed(single)}")
+    return single[name]
 
 
 def _check(
     model: mujoco.MjModel,
-    samples: int,
+    muscles: Sequence[str] | str | None,
     span: tuple[float, float] | None,
     qpos: ArrayLike | None,
     activation: float,
 ) -> None:
-    if not samples >= 2:
-        raise ModelError(f"samples must be 2 or more, not {samples!r}")
-    if span is not None and not (np.isfinite(span).all() and span[1] > span[0]):
-        raise ModelError(f"the span must be two finite numbers, the second one larger, not {span!r}")
-    if qpos is not None and np.shape(qpos) != (model.nq,):
-        raise ModelError(f"qpos must have shape ({model.nq},), not {np.shape(qpos)}")
-    if not 0.0 <= activation <= 1.0:
+    if muscles is not None and not isinstance(muscles, str):
+        validation.sequence(muscles, "muscles", ModelError, "patterns of names")
+        good = all(isinstance(pattern, str) for pattern in muscles)
+        validation.require(good, "muscles", "patterns of names", muscles, ModelError)
+    if span is not None:
+        low, high = validation.several(span, 2, "span", ModelError)
+        if not (math.isfinite(low) and math.isfinite(high) and high > low):
+            raise ModelError(f"the span must be two finite numbers, the second one larger, not {span!r}")
+    if qpos is not None:
+        shape = validation.numbers(qpos, "qpos", ModelError).shape
+        if shape != (model.nq,):
+            raise ModelError(f"qpos must have shape ({model.nq},), not {shape}")
+    if not 0.0 <= validation.finite(activation, "activation", ModelError) <= 1.0:
         raise ModelError(f"activation must lie between 0 and 1, not {activation!r}")
 
 
-def _activate(system: MuscleSystem, data: mujoco.MjData, activation: float) -> None:
-    """Set excitation and activation of all muscles; fibre lengths of 0 mean static equilibrium."""
+def _activate(system: CableSystem, data: mujoco.MjData, activation: float) -> None:
+    """Set excitation and activation of all muscles; fibre lengths of 0 mean static equilibrium.
+
+    The controls of cables stay 0: they may be lengths, speeds or forces.
+    """
     model, branch = system.model, system.branch(data)
     own = branch[len(branch) - 2 * system.n :].reshape(-1, 2)
     own[:] = activation, 0.0
     for i, muscle in enumerate(system.declarations):
         system.excitation[i] = activation
-        if muscle.actuator < 0:
+        if muscle.actuator < 0 or is_cable(muscle):
             continue
         data.ctrl[model.actuator_ctrladr[muscle.actuator]] = activation
         if model.actuator_actnum[muscle.actuator]:
@@ -230,12 +249,12 @@ def _activate(system: MuscleSystem, data: mujoco.MjData, activation: float) -> N
 
 
 def _chosen(
-    system: MuscleSystem, wanted: Sequence[str] | str | None, joint: str, length: Array, slope: Array
+    system: CableSystem, wanted: Sequence[str] | str | None, joint: str, length: Array, slope: Array
 ) -> list[int]:
     """Return the indices of the muscles that the patterns match, or of those that the joint moves."""
     known = system.names
     if not known:
-        raise ModelError("the model has no muscle with a path of mjwrap")
+        raise ModelError("the model has no muscle or cable with a path of mjwrap")
     if wanted is None:
         moved = np.abs(slope).max(axis=0) > MOVED * np.abs(length).max(axis=0)
         if not moved.any():

@@ -2,5 +2,6 @@
 
 from mjwrap.system.cables import CableSystem, is_cable, twin_of
 from mjwrap.system.muscle_system import MuscleSystem
+from mjwrap.system.muscle_view import pulls_as_cable
 
-__all__ = ["CableSystem", "MuscleSystem", "is_cable", "twin_of"]
+__all__ = ["CableSystem", "MuscleSystem", "is_cable", "pulls_as_cable", "twin_of"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.mjcf import name_of, names
 from mjwrap.mjcf.couplings import CoupledJoints
@@ -34,9 +35,17 @@ def moment_arms(
     """Return −J N (n, k) [m] at a pose qpos (nq,), from J = ∂l/∂q (n, nv); see `MuscleSystem.moment_arms`."""
     couplings = CoupledJoints(model)
     given = independent_coordinates(model) if coordinates is None else coordinates
-    dofs = _dofs(model, couplings, [given] if isinstance(given, str) else list(given))
+    dofs = _dofs(model, couplings, _listed(given))
     columns = np.searchsorted(couplings.independent, dofs)
     return -jacobian @ couplings.matrix(qpos)[:, columns]
+
+
+def _listed(coordinates: Iterable[str]) -> list[str]:
+    good = isinstance(coordinates, Iterable) and not isinstance(coordinates, Mapping | bytes)
+    found = [coordinates] if isinstance(coordinates, str) else list(coordinates) if good else []
+    good = good and all(isinstance(name, str) for name in found)
+    validation.require(good, "coordinates", "a joint's name, or several", coordinates, GeometryError)
+    return found
 
 
 def _dofs(model: mujoco.MjModel, couplings: CoupledJoints, coordinates: list[str]) -> NDArray[np.int64]:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from mjwrap import html, plots
 from mjwrap.errors import MjwrapError, StateError
-from mjwrap.mjcf import MuscleDeclaration, Route
+from mjwrap.mjcf import MuscleDeclaration, Route, is_muscle
 from mjwrap.mjcf.names import name_of
-from mjwrap.muscles.laws import Law
+from mjwrap.muscles.laws import ActuatorForce, Law
 from mjwrap.paths import Status
 from mjwrap.paths.pictures import flattest_view
+from mjwrap.text import counted_paths
 
 Array = NDArray[np.float64]
 _SITE, _GEOM = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
@@ -169,7 +170,8 @@ class MuscleView:
         given = fields(law) if is_dataclass(law) else ()
         parameters = [(field.name, getattr(law, field.name)) for field in given]
         facts = [("status", self.status.name), *_numbers(self), ("route", self.route), ("law", law.law)]
-        shown = html.facts([*facts, *parameters], f"muscle {self.name}")
+        kind = "cable" if pulls_as_cable(self._muscles.model, self.declaration) else "muscle"
+        shown = html.facts([*facts, *parameters], f"{kind} {self.name}")
         points = self.points()
         good = points[np.isfinite(points).all(axis=1)]
         if len(good) < 2:
@@ -187,6 +189,15 @@ def _numbers(muscle: MuscleView) -> list[tuple[str, str]]:
         ("activation", f"{muscle.activation:.4g}"),
         ("fibre length", f"{muscle.fiber_length:.6g} m"),
     ]
+
+
+def pulls_as_cable(model: mujoco.MjModel, muscle: MuscleDeclaration) -> bool:
+    """Return whether an actuator of MuJoCo's that is not a muscle pulls along the path of a muscle."""
+    return isinstance(muscle.parameters, ActuatorForce) and not is_muscle(model, muscle.actuator)
+
+
+def _cables(muscles: Muscles) -> int:
+    return sum(pulls_as_cable(muscles.model, muscle) for muscle in muscles.declarations)
 
 
 def route_text(model: mujoco.MjModel, route: Route) -> str:
@@ -212,13 +223,14 @@ def system_text(muscles: Muscles) -> str:
         told.append(f"without a path: {', '.join(failed[:FEW])}{', ...' * (len(failed) > FEW)}")
     if muscles.native:
         told.append(f"{len(muscles.native)} left to MuJoCo")
-    plural = "s" * (len(names) != 1)
-    return f"{type(muscles).__name__}({len(names)} muscle{plural}{': ' * bool(told)}{'; '.join(told)})"
+    count = counted_paths(len(names), _cables(muscles))
+    return f"{type(muscles).__name__}({count}{': ' * bool(told)}{'; '.join(told)})"
 
 
 def system_html(muscles: Muscles) -> str:
     """Return a system as a notebook shows it: a row for each muscle, and the actuators left to MuJoCo."""
-    heads = ("muscle", "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
+    first = "cable" if 0 < muscles.n == _cables(muscles) else "muscle"
+    heads = (first, "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
     rows: list[list[str]] = []
     status = _status(muscles)
     try:

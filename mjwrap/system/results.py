@@ -180,7 +180,11 @@ class Results:
         """Return a view of one muscle, by name or number; `GeometryError`, with near names, if there is none."""
         if isinstance(muscle, str):
             return MuscleView(self, self.index(muscle))
-        place = operator.index(muscle)
+        try:
+            place = operator.index(muscle)
+        except TypeError:
+            shown = validation.described(muscle)
+            raise GeometryError(f"muscle must be a name or a whole number, not {shown}") from None
         return MuscleView(self, self._known(place + self.n if -self.n <= place < 0 else place))
 
     def __iter__(self) -> Iterator[MuscleView]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import RecordingError
+from mjwrap.validation import described
 
 MODEL = "model"  # the model's own background: its sky and its scenery
 NAMED = {"light": (0.90, 0.915, 0.935), "dark": (0.09, 0.10, 0.11)}
@@ -22,14 +23,16 @@ _FLAGS = ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_REFLECTION")
 
 def background_color(background: str) -> NDArray[np.float64] | None:
     """Return red, green, blue from 0 to 1 of a name or "#RRGGBB"; None for the model's own background."""
-    if background == MODEL:
+    if isinstance(background, str) and background == MODEL:
         return None
-    if background in NAMED:
+    if isinstance(background, str) and background in NAMED:
         return np.array(NAMED[background])
     if isinstance(background, str) and _HEX.fullmatch(background):
         return np.array([int(background[i : i + 2], 16) / 255 for i in (1, 3, 5)])
     names = ", ".join([*NAMED, MODEL])
-    raise RecordingError(f"background must be one of {names}, or a colour '#RRGGBB', not {background!r}")
+    raise RecordingError(
+        f"background must be one of {names}, or a colour '#RRGGBB', not {described(background)}"
+    )
 
 
 def paint_background(scene: mujoco.MjvScene, context: mujoco.MjrContext, color: NDArray[np.float64]) -> None:

@@ -75,6 +75,7 @@ class Video(RunLog):
         for name, pixels in (("width", width), ("height", height)):
             good = isinstance(pixels, int | float | np.integer) and pixels == pixels // 1
             require(name, pixels, good and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384")
+        validation.flag(shadows, "shadows", RecordingError)
         self._model, self._camera = model, find_camera(model, camera)
         self._option = option or mujoco.MjvOption()
         self._look = FilmLook(background, colors, surfaces, legend, int(width), int(height))

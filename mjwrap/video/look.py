@@ -8,8 +8,8 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError
-from mjwrap.files.atomic import require
 from mjwrap.video.background import background_color, floor_color, paint_background, scenery
 from mjwrap.video.camera import extent, muscle_points
 from mjwrap.video.formats import Picture
@@ -33,7 +33,8 @@ class FilmLook:
     ) -> None:
         check_colors(colors)
         for name, value in (("surfaces", surfaces), ("legend", legend)):
-            require(name, value, value in (None, True, False), "True, False or None")
+            good = value is None or (isinstance(value, bool | np.bool_ | int) and value in (0, 1))
+            validation.require(good, name, "True, False or None", value, RecordingError)
         self._color = background_color(background)
         self._dark = self._color is not None and float(np.mean(self._color)) < 0.5
         self._options, self._size, self._wants_legend = (colors, surfaces), (width, height), legend

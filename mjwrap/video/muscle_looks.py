@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap import validation
 from mjwrap.errors import RecordingError, StateError
 from mjwrap.plugin import Muscles
 from mjwrap.surfaces import Capsule, Cylinder, Ellipsoid, Sphere, Surface
@@ -154,8 +155,8 @@ class MuscleLooks:
 
 def check_colors(colors: str | None) -> None:
     """Raise RecordingError if a film has no colours of this name."""
-    if colors is not None and colors not in COLORS:
-        raise RecordingError(f"colors must be one of {', '.join(COLORS)}, not {colors!r}")
+    if colors is not None:
+        validation.choice(colors, COLORS, "colors", RecordingError)
 
 
 def hide(scene: mujoco.MjvScene, geoms: set[int]) -> None:

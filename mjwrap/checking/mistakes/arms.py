@@ -40,7 +40,7 @@ def moment_arm_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
         joints = few([quoted(posed.model, "joint", j) for j in about])
         yield PossibleMistake(
             Mistake.NO_MOMENT_ARM,
-            muscle_of(muscles.declarations[i]),
+            muscle_of(posed.model, muscles.declarations[i]),
             f"has no moment arm at the reference pose about the joints that it crosses ({joints})",
             "its path runs through the axis, or along it: check the places of its sites and the axis",
         )
@@ -74,7 +74,7 @@ def sign_changes(posed: Posed) -> Iterator[PossibleMistake]:
     for i in sorted(i for i in told if alone[i]):
         yield PossibleMistake(
             Mistake.SIGN_CHANGE,
-            muscle_of(muscles.declarations[i]),
+            muscle_of(posed.model, muscles.declarations[i]),
             f"has moment arms of both signs about {quoted(model, 'joint', int(main[i]))}: {told[i]}",
             "if it should pull one way throughout, add a surface that keeps it on its side of the joint, or check the "
             "joint's range",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import mujoco
 
 from mjwrap.mjcf import MuscleDeclaration, name_of
+from mjwrap.system import pulls_as_cable
 
 
 class Mistake(enum.StrEnum):
@@ -77,9 +78,9 @@ def quoted(model: mujoco.MjModel, kind: str, index: int) -> str:
     return f"{kind} '{name_of(model, _OBJECTS[kind], index)}'"
 
 
-def muscle_of(muscle: MuscleDeclaration) -> str:
-    """Return the element of a muscle."""
-    return f"muscle '{muscle.name}'"
+def muscle_of(model: mujoco.MjModel, muscle: MuscleDeclaration) -> str:
+    """Return the element of a muscle or cable."""
+    return f"{'cable' if pulls_as_cable(model, muscle) else 'muscle'} '{muscle.name}'"
 
 
 def millimetres(length: float) -> str:

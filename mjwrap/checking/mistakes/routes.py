@@ -13,6 +13,7 @@ from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetr
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf import MuscleDeclaration, Route, name_of
 from mjwrap.mjcf.actuators import is_muscle
+from mjwrap.system import pulls_as_cable
 
 Array = NDArray[np.float64]
 SAME = 1e-6  # distance of stops that count as one place, as a share of the muscle's size
@@ -41,11 +42,11 @@ def route_mistakes(posed: Posed, hints: bool) -> Iterator[PossibleMistake]:
     first: dict[Hashable, MuscleDeclaration] = {}
     for i, muscle in enumerate(muscles.declarations):
         key = tuple(_place(model, route) for route in muscle.routes)
-        if key in first:
+        if key in first and not _on_one_tendon(model, muscle, first[key]):
             yield PossibleMistake(
                 Mistake.SAME_ROUTE,
-                muscle_of(muscle),
-                f"has the same sites and surfaces as {muscle_of(first[key])}",
+                muscle_of(model, muscle),
+                f"has the same sites and surfaces as {muscle_of(model, first[key])}",
                 "if it is a copy, give it its own sites",
             )
         first.setdefault(key, muscle)
@@ -61,14 +62,14 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration, hints: bool) -> I
         bodies = ", ".join(quoted(model, "body", b) for b in sorted(stops))
         yield PossibleMistake(
             Mistake.NO_JOINT,
-            muscle_of(muscle),
+            muscle_of(model, muscle),
             f"crosses no joint: no motion changes its length (its ends are on {bodies})",
             "put its insertion into the body that it should move",
         )
     if not posed.found[i]:
         yield PossibleMistake(
             Mistake.NO_PATH,
-            muscle_of(muscle),
+            muscle_of(model, muscle),
             f"has no path at the reference pose: {muscles.reason(i)}",
             "move its sites out of the surface, or make the surface smaller",
         )
@@ -76,25 +77,25 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration, hints: bool) -> I
         geoms = ", ".join(muscles.unmet_hints(i))
         yield PossibleMistake(
             Mistake.SIDE,
-            muscle_of(muscle),
+            muscle_of(model, muscle),
             f"passes {geoms} in the rest pose on another side than the hint or side site asks for, where no path was "
             f"found",
             "put the hint or side site where the muscle should touch",
         )
-    yield from _of_lengths(muscle, float(posed.sizes[i]))
+    yield from _of_lengths(model, muscle, float(posed.sizes[i]))
     for route in muscle.routes:
         yield from _of_stops(posed, i, muscle, route)
         yield from _of_side_sites(posed, muscle, route)
 
 
-def _of_lengths(muscle: MuscleDeclaration, size: float) -> Iterator[PossibleMistake]:
+def _of_lengths(model: mujoco.MjModel, muscle: MuscleDeclaration, size: float) -> Iterator[PossibleMistake]:
     """Yield a finding for a length of fibre or tendon that is in another unit than the path."""
     for name in ("optimal_fiber_length", "tendon_slack_length"):
         length = getattr(muscle.parameters, name, None)
         if length is not None and length > OTHER_UNIT * size:
             yield PossibleMistake(
                 Mistake.PARAMETER,
-                muscle_of(muscle),
+                muscle_of(model, muscle),
                 f"has a {name} of {millimetres(length)}, and its stops are only {millimetres(size)} apart",
                 "lengths are in metres",
             )
@@ -112,7 +113,7 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
         if float(np.linalg.norm(places[b] - places[a])) <= SAME * posed.sizes[i]:
             yield PossibleMistake(
                 Mistake.SAME_PLACE,
-                muscle_of(muscle),
+                muscle_of(model, muscle),
                 "has stops at one place, one after the other: "
                 + (f"{names[a]} and {names[b]}" if names[a] != names[b] else f"{names[a]}, twice"),
                 "leave one of them out, or give the site its own position",
@@ -122,7 +123,7 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
         if _turns_back(straights, places[k], SAME * posed.sizes[i]):
             yield PossibleMistake(
                 Mistake.TURNS_BACK,
-                muscle_of(muscle),
+                muscle_of(model, muscle),
                 f"turns back at {names[k]}, between {names[k - 1]} and {names[k + 1]}",
                 "check the order of its sites",
             )
@@ -150,10 +151,16 @@ def _of_side_sites(posed: Posed, muscle: MuscleDeclaration, route: Route) -> Ite
             yield PossibleMistake(
                 Mistake.SIDE_AS_STOP,
                 quoted(posed.model, "site", node.site),
-                f"is a stop of {muscle_of(muscle)}, which runs through it, although its name speaks of a side of "
-                f"{quoted(posed.model, 'geom', before.geom)}",
+                f"is a stop of {muscle_of(posed.model, muscle)}, which runs through it, although its name "
+                f"speaks of a side of {quoted(posed.model, 'geom', before.geom)}",
                 'write prm="1" at its element in the tuple, which makes it a hint',
             )
+
+
+def _on_one_tendon(model: mujoco.MjModel, muscle: MuscleDeclaration, other: MuscleDeclaration) -> bool:
+    """Return whether actuators that are not both muscles share a tendon, such as a servo and a brake."""
+    shared = muscle.tendon >= 0 and muscle.tendon == other.tendon
+    return shared and (pulls_as_cable(model, muscle) or pulls_as_cable(model, other))
 
 
 def _place(model: mujoco.MjModel, route: Route) -> Hashable:

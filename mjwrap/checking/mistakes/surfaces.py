@@ -61,7 +61,7 @@ def _of_surface(
         return PossibleMistake(
             Mistake.PLACEHOLDER,
             geom,
-            f"is wrapped by {muscle_of(muscle)} as a {shape} of {millimetres(surface.size)}, although "
+            f"is wrapped by {muscle_of(model, muscle)} as a {shape} of {millimetres(surface.size)}, although "
             + (f"{meant} seems to give it another shape" if numeric >= 0 else f"its name speaks of a {word}"),
             f"list {meant} directly after the geom in the tuple",
         )
@@ -69,7 +69,7 @@ def _of_surface(
         return PossibleMistake(
             Mistake.PLACEHOLDER if node.sizes < 0 else Mistake.SIZE,
             geom,
-            f"is wrapped by {muscle_of(muscle)}, which is {millimetres(size)} long, as a {shape} of only "
+            f"is wrapped by {muscle_of(model, muscle)}, which is {millimetres(size)} long, as a {shape} of only "
             f"{millimetres(surface.size)}",
             "if it stands for another shape, list the numeric of that shape directly after it in the tuple; sizes are "
             "in metres",
@@ -78,7 +78,7 @@ def _of_surface(
         return PossibleMistake(
             Mistake.SIZE,
             geom,
-            f"is a {shape} of {millimetres(surface.size)}, and {muscle_of(muscle)} that wraps it is only "
+            f"is a {shape} of {millimetres(surface.size)}, and {muscle_of(model, muscle)} that wraps it is only "
             f"{millimetres(size)} long",
             "check its size: sizes are in metres, and radii, not diameters",
         )
@@ -90,7 +90,7 @@ def _of_surface(
         return PossibleMistake(
             Mistake.FAR_AWAY,
             geom,
-            f"is {millimetres(away)} away from {muscle_of(muscle)}, which is {millimetres(size)} long",
+            f"is {millimetres(away)} away from {muscle_of(model, muscle)}, which is {millimetres(size)} long",
             "check its position, and that it is in the right body",
         )
     chord = posed.poses.site_xpos[ends[1]] - posed.poses.site_xpos[ends[0]]
@@ -100,15 +100,15 @@ def _of_surface(
         return PossibleMistake(
             Mistake.AXIS,
             geom,
-            f"is a {shape} whose axis, local z, runs along {muscle_of(muscle)}, which does not touch it",
+            f"is a {shape} whose axis, local z, runs along {muscle_of(model, muscle)}, which does not touch it",
             "turn the geom so that its axis runs across the path, such as zaxis='0 1 0'",
         )
     if surface.numeric == RING and posed.found[i] and not touched and not _threads(posed, i, node):
         return PossibleMistake(
             Mistake.RING,
             geom,
-            f"is a ring that {muscle_of(muscle)} passes at the reference pose without touching it or running through "
-            f"its hole",
+            f"is a ring that {muscle_of(model, muscle)} passes at the reference pose without touching it or "
+            "running through its hole",
             "put a hint on the inner side of its tube (a site with prm='1' directly after it), and check its axis, "
             "which is local z",
         )

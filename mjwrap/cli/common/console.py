@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import itertools
 import os
+import re
 import sys
 import textwrap
 import warnings
@@ -21,6 +22,8 @@ _SUFFIXES = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
 _MYO_NOISE = (
     "Attaching a spec with an empty prefix"  # raised by myo_sim's models; matters only when they are saved
 )
+
+_NEGATIVE = re.compile(r"-\.?\d")
 
 INPUTS = (
     "model",
@@ -64,8 +67,15 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Read the arguments; a model or recording after --json or --connect is not taken as their value."""
+        """Read the arguments; a model or recording after --json or --connect is not taken as their value.
+
+        After an option with one value, a word like -10deg,20deg is this value, not an option.
+        """
         given = list(args or [])
+        single = {f for a in self._actions if a.nargs is None for f in a.option_strings}
+        for i in range(len(given) - 1, 0, -1):
+            if given[i - 1] in single and _NEGATIVE.match(given[i]):
+                given[i - 1 : i + 1] = [f"{given[i - 1]}={given[i]}"]
         optional = {f: a.const for a in self._actions if a.nargs == "?" for f in a.option_strings}
         for i, (word, following) in enumerate(itertools.pairwise(given)):
             if word in optional and (

@@ -46,6 +46,8 @@ def _coordinates(model: mujoco.MjModel, couplings: CoupledJoints) -> tuple[list[
 def arms_table(model: mujoco.MjModel, arms: Arms) -> str:
     """Return a line for each muscle: the joints that it crosses, with its moment arms in mm."""
     slides = {n for n, j in single_joints(model).items() if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE}
+    free = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)).tolist()
+    slides |= {f"{model.joint(j).name or f'#{j}'}[{k}]" for j in free for k in range(3)}
     rows = []
     for muscle, values in arms.items():
         cells = [f"{name} {_value(arm, name in slides)}" for name, arm in values.items()]

@@ -1,10 +1,10 @@
 """Plot lengths, moment arms and forces of muscles over a joint, with tables of data over them.
 
-MODEL is an MJCF or MJB file, or myo_sim:NAME for a model of the myo-sim package. Several models are drawn together.
+Several models are drawn together.
 
 The joint is moved over its range; joints that are coupled to it follow, and all others stay in the start pose. Without
---muscle all muscles that the joint moves are drawn. Muscles are at rest at --activation; forces are those along the
-tendon.
+--muscle all muscles and cables that the joint moves are drawn. Muscles are at rest at --activation; forces are those
+along the tendon. Cables, which MuJoCo's own actuators pull, have lengths and moment arms only.
 
 --data lays tables (.csv, .sto, .mot, .npz) over the curves, as points or, where a column NAME has NAME_low and
 NAME_high or NAME_std beside it, as bands. The first column, or the one called by the joint's name, is the position. A

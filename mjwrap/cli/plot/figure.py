@@ -124,7 +124,9 @@ def _apart(
         first = axes[0] if first is None else first
         for place, (axis, name) in enumerate(zip(axes, muscles, strict=False)):
             for number, each in enumerate(found):
-                _draw(axis, each, name, quantity, colours[number % 10], "-")
+                share = number / (len(found) - 1) if len(found) > 1 else 0.8
+                width = WIDEST - (WIDEST - NARROWEST) * share
+                _draw(axis, each, name, quantity, colours[number % 10], "-", width)
             _draw_tables(axis, given, name, quantity, "0.15", found)
             axis.grid(alpha=0.25)
             _limit(axis, found, given)

@@ -19,14 +19,14 @@ from mjwrap.errors import ModelError
 from mjwrap.poses import JointCurves, curves
 from mjwrap.runs.angles import check_range
 from mjwrap.runs.models import find_joint, load, start_keyframe, start_state
-from mjwrap.text import aligned, counted
+from mjwrap.text import aligned, counted_paths
 
 
 @dataclass(frozen=True)
 class PlotSettings:
     """The settings of `mjwrap plot`.
 
-    models: files, or "myo_sim:NAME"; joints: the joint in each of them. muscles: patterns of names, None for all that
+    models: files or names; joints: the joint in each of them. muscles: patterns of names, None for all that
     the joint moves. quantities: of `QUANTITIES`. span: positions of the joint [rad or m], None for its range. samples:
     number of positions. activation: 0 to 1. keyframe, positions: pose of the other joints [rad or m]. native: draw
     MuJoCo's tendons, too. side_rule: as for `MuscleSystem`. data: tables, or None. picture, csv: files, or None.
@@ -63,6 +63,8 @@ def plot(settings: PlotSettings) -> int:
     turns = {each.curves.turns for each in found}
     if len(turns) > 1:
         raise UserError("the joints turn in some models and slide in others: plot them one by one")
+    for quantity in settings.quantities:
+        _check_values(found, quantity)
     for each in found:
         say(_told(each))
     muscles = list(dict.fromkeys(name for each in found for name in each.curves.names))
@@ -114,6 +116,17 @@ def _curves(settings: PlotSettings, source: str, joint: str) -> JointCurves:
         raise ModelError(f"{source}: {error}") from None
 
 
+def _check_values(found: Sequence[ModelCurves], quantity: str) -> None:
+    """Raise `UserError` if muscles have paths, and yet none of them has a quantity."""
+    if not any(np.isfinite(each.curves["length"]).any() for each in found):
+        return  # `_told` names the muscles
+    if any(np.isfinite(each.curves[quantity]).any() for each in found):
+        return
+    cables = all(len(each.curves.cables) == len(each.curves.names) for each in found)
+    why = "cables have lengths and moment arms only" if cables else "their laws have no fibres"
+    raise UserError(f"no muscle has a value of '{quantity}': {why}")
+
+
 def _told(each: ModelCurves) -> str:
     found = each.curves
     low, high = found.at[0], found.at[-1]
@@ -122,7 +135,7 @@ def _told(each: ModelCurves) -> str:
         if found.turns
         else f"{low:.4g} to {high:.4g} m"
     )
-    text = f"{each.label}: {counted(len(found.names), 'muscle')}, {found.joint} from {places}"
+    text = f"{each.label}: {counted_paths(len(found.names), len(found.cables))}, {found.joint} from {places}"
     if found.follows:
         text += f"; {found.joint} follows {found.follows} in the model, and is moved alone here"
     lost = [name for i, name in enumerate(found.names) if np.isnan(found["length"][:, i]).any()]

@@ -6,8 +6,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf import name_of
+from mjwrap.mjcf import is_muscle, name_of
+from mjwrap.runs.excitation import control_names
 from mjwrap.runs.simulation import Simulation
+from mjwrap.system import CableSystem, MuscleSystem
 from mjwrap.text import counted
 
 MOST = 6  # joints of which the position is told
@@ -50,14 +52,51 @@ def undriven(simulation: Simulation) -> str:
         return ""
     model, data = simulation.engine.model, simulation.engine.data
     still = not model.njnt or max(_changes(model, simulation.start, data.qpos)) < STILL
-    pulling = excitation.muscle_names
+    cables = _cables(simulation.muscles)
+    pulling = [name for name in excitation.muscle_names if name not in cables]
     one = (pulling or excitation.names)[0]
     add = f"add --excitation pulses, or for one of them --excitation {one}=constant:0.5"
     if not pulling:
-        add = f"add --excitation {one}=constant:0.5"
+        add = f"add --excitation {one}=constant:{_level(simulation.muscles.model, one):.3g}"
+    if held := _set_points(model):
+        shown = ", ".join(held[:MOST]) + ", ..." * (len(held) > MOST)
+        return f"all controls were zero, which is a set point and not the absence of force for {shown}: {add}"
     if still:
         return f"nothing moved, because all controls are zero: {add}"
     return f"all controls were zero, so that only gravity, springs and passive forces moved it: {add}"
+
+
+def _cables(muscles: MuscleSystem) -> list[str]:
+    """Return the cables, also those that stay with MuJoCo."""
+    own = muscles.cables if isinstance(muscles, CableSystem) else []
+    ids = {
+        name: mujoco.mj_name2id(muscles.model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in muscles.native
+    }
+    return [*own, *(name for name, i in ids.items() if i >= 0 and not is_muscle(muscles.model, i))]
+
+
+def _set_points(model: mujoco.MjModel) -> list[str]:
+    """Return the actuators that act at a control of zero: servos of a position, and those whose range excludes zero."""
+    found = []
+    for i in range(model.nactuator):
+        affine = int(model.actuator_biastype[i]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        first = int(model.actuator_ctrladr[i])
+        limits = (
+            model.actuator_ctrlrange[first] if np.ravel(model.actuator_ctrllimited)[first] else (0.0, 0.0)
+        )
+        if (affine and model.actuator_biasprm[i, :2].any()) or not limits[0] <= 0.0 <= limits[1]:
+            found.append(name_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i))
+    return found
+
+
+def _level(model: mujoco.MjModel, name: str) -> float:
+    """Return a control to try: 0.5, or the middle of the range if this is out of it."""
+    names = control_names(model)
+    place = names.index(name) if name in names else -1
+    if place < 0 or not np.ravel(model.actuator_ctrllimited)[place]:
+        return 0.5
+    low, high = model.actuator_ctrlrange[place].tolist()
+    return 0.5 if low <= 0.5 <= high else 0.5 * (low + high)
 
 
 def _changes(model: mujoco.MjModel, before: NDArray[np.float64], after: NDArray[np.float64]) -> list[float]:
