@@ -127,7 +127,7 @@ def _muscle_panel(
         values = 1e3 * values
     if not many:
         _lines(axis, time, {name: values[:, i] for i, name in enumerate(muscles.names)}, label)
-        if panel == "activation":
+        if panel == "activation" and cables < muscles.n:  # controls of cables have any unit and any size
             axis.set_ylim(-0.03, max(1.03, float(values.max()) * 1.03))
         return
     if panel == "length":  # each muscle relative to its own first length, because lengths differ tenfold
