@@ -237,7 +237,9 @@ def cheap(line: Line) -> bool:
         return False
     if {"--connect", "--serve"} & set(words):  # a viewer listens to it
         return False
-    if "--in-place" in words or "out/" in " ".join(_given(words)):  # it changes the model; another line made its table
+    if "--in-place" in words or "out/" in " ".join(
+        _given(words)
+    ):  # it changes the model; another line made its table
         return False
     driven = words[words.index("--excitation") + 1] if "--excitation" in words else ""
     if Path(driven).suffix in mw.files.SUFFIXES:  # a table that another run made

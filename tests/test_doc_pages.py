@@ -8,6 +8,7 @@ import importlib.util
 import os
 import shlex
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -50,16 +51,18 @@ def test_the_commands_of_a_page_run_one_after_another(
     ran = 0
     for text in lines(page):
         program, *words = shlex.split(text)
-        if program != "mjwrap" or words[0] == "replay" and words[1].endswith(".rrd"):  # it opens a viewer
+        if program != "mjwrap" or (words[0] == "replay" and words[1].endswith(".rrd")):  # it opens a viewer
             continue
         if "--video" in words and not films():
             continue
         shorter = ["--duration", "0.1"] if "--video" in words else LESS.get(words[0], [])
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message=".*empty prefix")  # from how myo_sim composes its models
+            warnings.filterwarnings(
+                "ignore", message=".*empty prefix"
+            )  # from how myo_sim composes its models
             result = run_here(words[0], capsys, *words[1:], *shorter)
         assert result.code == 0, (text, result.err)
-        outputs = [b for a, b in zip(words, words[1:], strict=False) if a in ("-o", "--plot", "--record", "--report")]
+        outputs = [b for a, b in pairwise(words) if a in ("-o", "--plot", "--record", "--report")]
         assert all(Path(name).stat().st_size > 1000 for name in outputs), text
         ran += 1
     assert ran >= 3
@@ -73,7 +76,8 @@ def test_the_code_for_myosuite_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     code = [
         fence["body"]
         for fence in FENCE.finditer(text)
-        if fence["language"] == "python" and text[: fence.start()].rstrip().rpartition("\n")[2].startswith(mark)
+        if fence["language"] == "python"
+        and text[: fence.start()].rstrip().rpartition("\n")[2].startswith(mark)
     ]
     assert len(code) == 2
     names: dict[str, Any] = {}

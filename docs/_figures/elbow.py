@@ -2,8 +2,8 @@
 
     python docs/_figures/elbow.py
 
-Parameters are those of models/elbow/elbow.xml, whose README has the source of each. Fibre lengths over elbow flexion and
-the force-length curves are mjwrap's, those of De Groote-Fregly 2016.
+Parameters are those of models/elbow/elbow.xml, whose README has the source of each. The force-length curves are those of
+De Groote-Fregly 2016; fibre lengths, tensions and moments are computed by mjwrap.
 """
 
 from __future__ import annotations
@@ -35,9 +35,16 @@ def force_length(axis: Any, curves: Any, colours: dict[str, Any]) -> None:
     low, high = curves["normalized_fiber_length"].min(axis=0), curves["normalized_fiber_length"].max(axis=0)
     for place, (name, colour) in enumerate(colours.items()):
         height = -0.12 * (place + 1)
-        axis.plot((low[place], high[place]), (height, height), color=colour, linewidth=5, solid_capstyle="butt")
+        axis.plot(
+            (low[place], high[place]), (height, height), color=colour, linewidth=5, solid_capstyle="butt"
+        )
         axis.text(0.22, height, name, fontsize=8, va="center", color=colour)
-    axis.set(xlabel="fibre length [optimal lengths]", ylabel="force [maximum isometric forces]", xlim=(0.18, 1.64), ylim=(-1.0, 1.5))
+    axis.set(
+        xlabel="fibre length [optimal lengths]",
+        ylabel="force [maximum isometric forces]",
+        xlim=(0.18, 1.64),
+        ylim=(-1.0, 1.5),
+    )
     axis.set_yticks((0.0, 0.5, 1.0, 1.5))
     axis.legend(fontsize=8, frameon=False, loc="upper left")
     axis.set_title("curves, and below them each muscle's fibre range", fontsize=10)

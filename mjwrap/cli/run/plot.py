@@ -134,7 +134,7 @@ def _muscle_panel(
         values, label = values - values[0], "length, change since the start [mm]"
     top = float(np.abs(values).max()) or 1.0
     norm = {
-        "activation": Normalize(0.0, 1.0),
+        "activation": Normalize() if cables == muscles.n else Normalize(0.0, 1.0),
         "length": Normalize(-top, top),
         "tension": PowerNorm(0.5, 0.0, top),  # so that small muscles are visible beside large ones
     }[panel]
