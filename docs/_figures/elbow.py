@@ -2,8 +2,8 @@
 
     python docs/_figures/elbow.py
 
-Parameters are those of models/elbow/elbow.xml, whose README has the source of each. The force-length curves are those of
-De Groote-Fregly 2016; fibre lengths, tensions and moments are computed by mjwrap.
+Parameters are those of models/elbow/elbow.xml, whose README has the source of each. The force-length curves are those
+of De Groote-Fregly 2016; fibre lengths, tensions and moments are computed by mjwrap.
 """
 
 from __future__ import annotations
