@@ -18,7 +18,7 @@ import mjwrap as mw
 from mjwrap.video import offscreen
 
 Image = pytest.importorskip("PIL.Image", reason="GIFs need Pillow")
-SIZE = {"width": 64, "height": 48}
+SIZE: dict[str, Any] = {"width": 64, "height": 48}
 CORD = """
 <mujoco>
   <visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>
