@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from cli_runs import ELBOW, run_here
+from matplotlib.colors import to_rgb
 from test_curves import ARM, triangle
 
 import mjwrap.cli.plot.figure as figures
@@ -158,6 +159,25 @@ def test_muscles_share_a_panel_with_a_legend(capsys: pytest.CaptureFixture[str],
     assert [axis.get_ylabel() for axis in axes] == ["length [mm]", "moment arm [mm]"]
     assert [len(axis.lines) for axis in axes] == [7, 7]
     assert len(axes[0].get_legend().get_texts()) == 7
+
+
+def test_a_long_table_is_seen_on_its_curve_and_its_long_name_leaves_room(
+    arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], drawn: list[Any]
+) -> None:
+    at = np.linspace(ANGLES[0], ANGLES[-1], 100)
+    name = "subject_01_MuscleAnalysis_MomentArm_of_the_elbow.csv"
+    data = table(tmp_path / name, ["elbow", "flexor [mm]"], at, np.full(100, 20.0))
+    ran = run_here("plot", capsys, arm, "--joint", "elbow", "--data", f"moment_arm={data}", "-o", "p.png")
+    assert (ran.code, ran.err) == (0, "")
+    (figure,) = drawn
+    parts = [axis for part in figure.subfigs for axis in part.axes] or figure.axes
+    (line,) = [line for axis in parts for line in axis.lines if len(line.get_xdata()) == 100]
+    curve = next(other for other in line.axes.lines if len(other.get_xdata()) == 91)
+    assert sum(to_rgb(line.get_color())) < 0.6 * sum(to_rgb(curve.get_color()))
+    legends = [x for x in (*figure.legends, *(axis.get_legend() for axis in parts)) if x]
+    words = [text.get_text() for text in legends[0].get_texts() if "subject" in text.get_text()]
+    assert words[0].replace("\n", "") == name
+    assert max(map(len, words[0].split("\n"))) <= 30
 
 
 def test_many_muscles_have_a_panel_each(

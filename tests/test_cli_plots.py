@@ -19,6 +19,7 @@ from mjwrap.cli.run import plot as run_plot
 from mjwrap.comparison import MotionDifference, MuscleSummary, PoseComparison
 from mjwrap.comparison.verdict import Curves
 from mjwrap.files.atomic import PartFile
+from mjwrap.system import CableSystem
 
 AT = np.linspace(0.0, 2.0, 11)
 
@@ -137,3 +138,33 @@ def test_every_muscle_of_a_run_has_a_name_that_can_be_read(
             assert upper.y0 > lower.y1 - 0.25 * lower.height
             lower = upper
     assert max(figure.get_size_inches()) * 110 < 12_000  # pixels
+
+
+@pytest.mark.parametrize("count", [3, 30])
+def test_controls_of_cables_fill_their_panel(count: int, tmp_path: Path, monkeypatch: Any) -> None:
+    """A control is a length, a force or anything else; a panel from 0 to 1 would show a flat line."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body><joint name="hinge"/><geom size=".1"/></body></worldbody></mujoco>'
+    )
+    muscles = CableSystem.__new__(CableSystem)
+    for name, value in {"cables": range(count), "failures": np.zeros(count, dtype=int)}.items():
+        monkeypatch.setattr(CableSystem, name, value, raising=False)
+    monkeypatch.setattr(CableSystem, "n", count, raising=False)
+    monkeypatch.setattr(CableSystem, "names", [f"cable{i}" for i in range(count)], raising=False)
+    time = np.linspace(0, 1, 20)
+    controls = np.tile(0.1 + 0.02 * np.sin(6 * time), (count, 1)).T
+    history = SimpleNamespace(
+        time=time, column={1: time[:, None], 2: controls, 3: controls, 4: controls}.__getitem__
+    )
+    kept: list[Any] = []
+    monkeypatch.setattr(run_plot, "save_figure", lambda figure, output: kept.append(figure))
+    run_plot.plot_run(PartFile(tmp_path / "p.png", ".png"), "run", model, muscles, history)  # type: ignore[arg-type]
+    (figure,) = kept
+    if count <= run_plot.LINES:
+        (panel,) = (axis for axis in figure.axes if axis.get_ylabel() == "control")
+        low, high = panel.get_ylim()
+    else:
+        drawn = next(axis for axis in figure.axes if axis.collections)
+        low, high = drawn.collections[0].get_clim()
+    assert high - low < 0.06
+    assert low > 0.05

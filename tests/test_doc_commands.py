@@ -52,6 +52,8 @@ SHORTER = {
     "compare": ["--samples", "3", "--bases", "0", "--duration", "0.02"],
     "check": ["--poses", "1", "--samples", "3"],
     "inspect": ["--quick"],
+    "plot": ["--samples", "5"],
+    "init": [],
 }
 
 
@@ -102,6 +104,8 @@ def _mjwrap(words: list[str], line: Line, made: set[str]) -> str | None:
     given += [x for x in getattr(options, "excitation", []) if Path(x).suffix in mw.files.SUFFIXES]
     wrong = [name for name in given if name and not _exists(name, line, made)]
     made.update(filter(None, (getattr(options, x, None) for x in ("record", "out", "csv", "video", "plot"))))
+    if getattr(options, "analysis", None):
+        made.add(f"{options.analysis}_MuscleAnalysis")  # and what follows it
     return f"no {wrong}" if wrong else None
 
 
@@ -130,7 +134,8 @@ def _exists(name: str, line: Line, made: set[str]) -> bool:
     # a recording may be made by the page's Python, and in a help text by another command
     python = Path(ROOT / "docs" / line.where)
     shown = python.is_file() and f'"{name}"' in python.read_text()
-    return brought or shown or name in made or (ROOT / name).is_file()
+    analysed = re.sub(r"(_MuscleAnalysis)_\w+\.sto$", r"\1", name) in made
+    return brought or shown or analysed or name in made or (ROOT / name).is_file()
 
 
 def _python(words: list[str]) -> str | None:
@@ -232,10 +237,20 @@ def cheap(line: Line) -> bool:
         return False
     if {"--connect", "--serve"} & set(words):  # a viewer listens to it
         return False
+    if "--in-place" in words or "out/" in " ".join(
+        _given(words)
+    ):  # it changes the model; another line made its table
+        return False
     driven = words[words.index("--excitation") + 1] if "--excitation" in words else ""
     if Path(driven).suffix in mw.files.SUFFIXES:  # a table that another run made
         return False
     return not BROUGHT & set(words) and (line.typed or "models/" in words[2])
+
+
+def _given(words: list[str]) -> list[str]:
+    """Return the words of a command line that are no names of outputs."""
+    outputs = {"-o", "--out", "--csv", "--plot", "--record", "--video", "--json", "--report", "--analysis"}
+    return [word for before, word in zip(["", *words], words, strict=False) if before not in outputs]
 
 
 RUN = sorted({line.text for line in LINES if cheap(line)})

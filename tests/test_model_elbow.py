@@ -1,5 +1,6 @@
 """models/elbow against published anatomy, and its native wraps against the closed form."""
 
+import csv
 import math
 
 import mujoco
@@ -59,6 +60,23 @@ def moment_arms(muscle: str, degrees: list[float]) -> Vector:
 def test_elbow_moment_arms_follow_published_curves(muscle: str, published: dict[float, float]) -> None:
     model_arms = moment_arms(muscle, list(published))
     assert model_arms == pytest.approx(list(published.values()), abs=4e-3)
+
+
+@pytest.mark.parametrize(
+    ("file", "published"),
+    [
+        ("pigeon_1996.csv", {"BIClong": PIGEON_1996_BICEPS, "TRIlat": PIGEON_1996_TRICEPS}),
+        ("sugisaki_2010.csv", {"TRIlong": SUGISAKI_2010_TRICEPS}),
+    ],
+)
+def test_the_tables_of_published_moment_arms_hold_the_published_numbers(
+    file: str, published: dict[str, dict[float, float]]
+) -> None:
+    with (ELBOW.parent / file).open(encoding="utf-8") as text:
+        rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
+    for muscle, curve in published.items():
+        found = {float(row["elbow_flexion [deg]"]): 0.01 * float(row[f"{muscle} [cm]"]) for row in rows}
+        assert {angle: found[angle] for angle in curve} == pytest.approx(curve)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from mjwrap.cli.common.figures import legend_label
 from mjwrap.cli.common.measured import MeasuredCurve
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 MANY = 60  # more points than this are drawn as a line
+DARKER = 0.45  # such a line against its muscle's colour, so that it is seen on a curve that it agrees with
+WIDE = 28  # letters of a line in the legend
 
 
 def draw_measured(
@@ -23,6 +26,10 @@ def draw_measured(
             at, value * curve.low, value * curve.high, color=colour, alpha=0.18, linewidth=0.0, zorder=1
         )
     if np.isfinite(curve.value).any():
+        if len(curve.at) > MANY:
+            from matplotlib.colors import to_rgb
+
+            colour = tuple(DARKER * part for part in to_rgb(colour))
         axis.plot(at, value * curve.value, color=colour, zorder=3, **style(curve, number))
 
 
@@ -49,7 +56,17 @@ def handles(given: Sequence[MeasuredCurve], colour: Any) -> list[Any]:
         own = [curve for curve in given if curve.source == source]
         pointed = next((curve for curve in own if np.isfinite(curve.value).any()), None)
         if pointed is None:
-            found.append(Patch(color=colour, alpha=0.3, linewidth=0.0, label=source))
+            found.append(Patch(color=colour, alpha=0.3, linewidth=0.0, label=_label(source)))
         else:
-            found.append(Line2D([], [], color=colour, label=source, **style(pointed, number)))
+            found.append(Line2D([], [], color=colour, label=_label(source), **style(pointed, number)))
     return found
+
+
+def _label(source: str) -> str:
+    """Return the name of a table for a legend, broken at "_" where it is long, so that the panels keep their width."""
+    lines = [""]
+    for part in source.split("_"):
+        if len(lines[-1]) + len(part) > WIDE and lines[-1]:
+            lines.append("")
+        lines[-1] += f"{part}_"
+    return legend_label("\n".join(lines)[:-1])

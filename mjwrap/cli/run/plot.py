@@ -127,14 +127,14 @@ def _muscle_panel(
         values = 1e3 * values
     if not many:
         _lines(axis, time, {name: values[:, i] for i, name in enumerate(muscles.names)}, label)
-        if panel == "activation":
+        if panel == "activation" and cables < muscles.n:  # controls of cables have any unit and any size
             axis.set_ylim(-0.03, max(1.03, float(values.max()) * 1.03))
         return
     if panel == "length":  # each muscle relative to its own first length, because lengths differ tenfold
         values, label = values - values[0], "length, change since the start [mm]"
     top = float(np.abs(values).max()) or 1.0
     norm = {
-        "activation": Normalize(0.0, 1.0),
+        "activation": Normalize() if cables == muscles.n else Normalize(0.0, 1.0),
         "length": Normalize(-top, top),
         "tension": PowerNorm(0.5, 0.0, top),  # so that small muscles are visible beside large ones
     }[panel]
