@@ -16,6 +16,7 @@ import mjwrap as mw
 
 PACKAGE = Path(mw.__file__).parent
 NOTICE = "mjwrap: compiling its kernels"
+COUNT = "kernels compiled so far"  # in lines that come every some seconds
 
 # A path over a cylinder and a sphere with a via point between them: most of what is compiled.
 SOLVE = """
@@ -34,7 +35,7 @@ print(json.dumps({
 
 @dataclass
 class Run:
-    """What one program said and how long it took [s], interpreter and imports included."""
+    """What one program said, but for counts of kernels, and how long it took [s], interpreter and imports included."""
 
     numbers: list[float]
     folder: Path
@@ -58,7 +59,8 @@ def run(program: str, home: Path, package: Path = PACKAGE, **environment: str) -
     assert done.returncode == 0, done.stderr
     said: dict[str, Any] = json.loads(done.stdout)
     assert said.get("converged", True)
-    return Run(said["numbers"], Path(said["folder"]), done.stderr.splitlines(), seconds)
+    told = [line for line in done.stderr.splitlines() if COUNT not in line]
+    return Run(said["numbers"], Path(said["folder"]), told, seconds)
 
 
 def copy_of_the_package(folder: Path) -> Path:

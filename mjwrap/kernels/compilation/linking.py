@@ -69,7 +69,13 @@ class Kernel(Dispatcher):
     def _copy(self) -> Any:
         """Return a kernel of the same function that Python can call; its machine code is kept beside this kernel's."""
         function, suffix = self.py_func, "_from_python"
-        copy = FunctionType(function.__code__, function.__globals__, function.__name__ + suffix)
+        copy = FunctionType(
+            function.__code__,
+            function.__globals__,
+            function.__name__ + suffix,
+            function.__defaults__,
+            function.__closure__,
+        )
         copy.__qualname__, copy.__module__ = function.__qualname__ + suffix, function.__module__
         wrapped = FromPython(copy, self.targetoptions)
         if not isinstance(self._cache, NullCache):

@@ -15,7 +15,7 @@ _FIRST = "mjwrap: compiling its kernels, which are kept for later runs ..."
 _FURTHER = (
     "mjwrap: compiling its kernels that were not used before ('mjwrap warmup' compiles all in advance) ..."
 )
-_SO_FAR = "mjwrap: {} kernels compiled in {:.0f} s"
+_SO_FAR = "mjwrap: kernels compiled so far: {}, in {:.0f} s"
 _OFTEN, _SELDOM = 0.25, 15.0  # [s] between two counts on a terminal, and in a file or notebook
 _CLEARED = "\r\x1b[K"  # the line that the cursor is in
 

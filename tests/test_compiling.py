@@ -1,0 +1,173 @@
+"""How kernels are compiled: for compiled callers, for Python, faster than by numba alone, counted, in two processes."""
+
+from __future__ import annotations
+
+import gc
+import io
+import operator
+import sys
+from types import SimpleNamespace
+
+import pytest
+from numba.core import types
+from numba.core.registry import cpu_target
+
+from mjwrap.kernels.compilation import self_test
+from mjwrap.kernels.compilation.cache_folders import config
+
+if config.DISABLE_JIT or self_test.is_plain():
+    pytest.skip("kernels are not compiled, or by numba.njit alone", allow_module_level=True)
+
+from mjwrap.cli.common import meanwhile
+from mjwrap.kernels.compilation import linking, pipeline, progress
+
+
+def double(x):
+    return 2.0 * x
+
+
+def test_a_kernel_for_compiled_callers_can_be_called_from_python_too() -> None:
+    inner = linking.Kernel(double, linking.OPTIONS)
+
+    def outer(x):
+        return inner(x) + 1.0
+
+    kernel = linking.FromPython(outer, linking.OPTIONS)
+    assert kernel(3.0) == 7.0
+    (compiled,) = inner.overloads.values()
+    assert "cpython" not in "".join(f.name for f in compiled.library.get_defined_functions())
+    assert inner(3.0) == 6.0
+    assert len(inner.overloads) == 1  # Python calls a copy
+    assert inner(4.0) == 8.0
+
+
+def test_what_python_calls_has_its_wrapper_at_once() -> None:
+    kernel = linking.FromPython(double, linking.OPTIONS)
+    assert kernel(3.0) == 6.0
+    assert len(kernel.overloads) == 1
+    assert kernel._wrapped is None
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_numba_and_the_garbage_collector_are_as_before_afterwards(fails: bool) -> None:
+    before = types.functions.BaseFunction.get_call_type
+    assert gc.isenabled()
+
+    def compile_something() -> None:
+        with pipeline.faster(), pipeline.faster():
+            assert types.functions.BaseFunction.get_call_type is not before
+            assert not gc.isenabled()
+            if fails:
+                raise RuntimeError
+
+    if fails:
+        with pytest.raises(RuntimeError):
+            compile_something()
+    else:
+        compile_something()
+    assert types.functions.BaseFunction.get_call_type is before
+    assert gc.isenabled()
+
+
+def test_a_collector_that_was_off_stays_off() -> None:
+    gc.disable()
+    try:
+        with pipeline.faster():
+            pass
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
+
+
+NUMBERS = (types.float64, types.int64, types.int32, types.boolean, types.literal(2), types.literal(-1))
+
+
+@pytest.mark.parametrize(
+    "symbol", ["add", "sub", "mul", "truediv", "floordiv", "pow", "lt", "eq", "and_", "lshift"]
+)
+def test_remembered_definitions_are_numbas(symbol: str) -> None:
+    context = cpu_target.typing_context
+    context.refresh()
+    function = context.resolve_value_type(getattr(operator, symbol))
+
+    def signature(args, resolve):
+        try:
+            return resolve(function, context, args, {})
+        except Exception as error:
+            return type(error)
+
+    numba = types.functions.BaseFunction.get_call_type
+    for args in [(a, b) for a in NUMBERS for b in NUMBERS]:
+        expected = signature(args, numba)
+        assert signature(args, pipeline._call_type) == expected
+        again = signature(args, pipeline._call_type)
+        assert again == expected
+        if not isinstance(expected, type):
+            key = function.get_impl_key(again)
+            signature(args, numba)
+            assert function.get_impl_key(again) == key
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def compilations(count: int, module: str = "mjwrap.kernels.x") -> str:
+    """Return what a watcher prints at nested compilations."""
+    watcher = progress.Progress()
+    event = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=SimpleNamespace(__module__=module))})
+    for _ in range(count):
+        watcher.on_start(event)
+    for _ in range(count):
+        watcher.on_end(event)
+    assert watcher.depth == 0
+    assert watcher.count == (count if module.startswith("mjwrap.") else 0)
+    return sys.stderr.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_count_moves_on_a_terminal_and_is_gone_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(progress, "_OFTEN", 0.0)
+    first, _, counts = compilations(3).partition("\n")
+    assert first.startswith("mjwrap: compiling its kernels")
+    shown = counts.split(progress._CLEARED)
+    assert [text.split(",")[0] for text in shown] == [
+        "",
+        "mjwrap: kernels compiled so far: 1",
+        "mjwrap: kernels compiled so far: 2",
+        "",
+    ]
+
+
+def test_a_file_gets_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert len(compilations(3).splitlines()) == 1
+    monkeypatch.setattr(progress, "_SELDOM", 0.0)
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert len(compilations(3).splitlines()) == 3
+
+
+def test_functions_of_others_are_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert compilations(2, "numpy.linalg") == ""
+
+
+def test_another_process_says_how_much_it_compiled() -> None:
+    meanwhile.laws()  # kept now
+    assert meanwhile.OtherProcess("mjwrap.cli.common.meanwhile:laws").compiled() == 0
+
+
+def test_a_process_that_fails_is_no_error_here() -> None:
+    assert meanwhile.OtherProcess("mjwrap.nowhere:nothing").compiled() is None
+
+
+def test_another_process_ends_when_it_is_stopped() -> None:
+    other = meanwhile.OtherProcess("mjwrap.cli.common.meanwhile:laws")
+    other.stop()
+    assert other.compiled() is None
+
+
+def test_no_process_is_started_where_the_laws_are_compiled() -> None:
+    meanwhile.laws()
+    assert meanwhile.start_laws() is None
