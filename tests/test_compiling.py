@@ -171,3 +171,20 @@ def test_another_process_ends_when_it_is_stopped() -> None:
 def test_no_process_is_started_where_the_laws_are_compiled() -> None:
     meanwhile.laws()
     assert meanwhile.start_laws() is None
+
+
+def test_all_deferred_kernels_that_may_be_called_can_be_compiled_in_advance() -> None:
+    def inner(x):
+        return 2.0 * x
+
+    inner.__qualname__ = "in-advance"
+    deferred = linking.Deferred(inner, linking.OPTIONS, types.float64)
+
+    def outer(x):
+        return deferred(x) if x > 0.0 else 0.0
+
+    kernel = linking.FromPython(outer, linking.OPTIONS)
+    assert deferred.compile_called() == 0  # nobody calls it yet
+    assert kernel(-1.0) == 0.0
+    assert (deferred.compile_called(), deferred.compile_called()) == (1, 0)
+    assert kernel(1.0) == 2.0

@@ -11,6 +11,7 @@ Examples:
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -25,7 +26,8 @@ from mjwrap.cli.common.arguments import MODEL_HELP, add_json
 from mjwrap.cli.common.meanwhile import CompileCount, OtherProcess, can_help, laws
 from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
-from mjwrap.kernels.compilation import cache_folders
+from mjwrap.kernels.compilation import cache_folders, self_test
+from mjwrap.kernels.compilation.cache_folders import config
 from mjwrap.runs.models import load
 from mjwrap.system import CableSystem
 from mjwrap.text import counted
@@ -87,7 +89,7 @@ def warm_up(settings: WarmupSettings) -> int:
     done(compile_part("first step", first_step))
     started = time.perf_counter()
     other = OtherProcess(f"{__name__}:muscles") if can_help() else None
-    for work in (paths, plugin, recording):
+    for work in (paths, plugin, recording, surfaces):
         done(compile_part(work.__name__, work))
     compiled = other.compiled() if other is not None else None
     if compiled is not None:
@@ -142,6 +144,7 @@ def paths() -> None:
     path.speed((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), np.zeros((2, 6)))
     path.wrenches(5.0)
     path.points(0.01)
+    _ = path.hints_met
     path.gradient()
     path.stiffness()
     path.stiffness_times(np.ones((4, 6)))
@@ -172,9 +175,26 @@ def evaluate(model: mujoco.MjModel) -> None:
         system.forces(0)
     system.polylines()
     system.contacts()
+    _ = system.hints_met
     system.energetics(mw.Umberger2010())
     if not system.status.any():
         system.length_jacobian_rate(data)
+
+
+def surfaces() -> None:
+    """Compile what only some surfaces, rows and moves need: every kernel that is compiled at its first call."""
+    if self_test.is_plain() or config.DISABLE_JIT:
+        return
+    from mjwrap.kernels.compilation.linking import (
+        Deferred,  # uses inner parts of numba that another version may lack
+    )
+
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith("mjwrap.kernels.")]
+    kernels = {
+        kernel for module in modules for kernel in vars(module).values() if isinstance(kernel, Deferred)
+    }
+    while sum(kernel.compile_called() for kernel in kernels):  # one may call another
+        pass
 
 
 def plugin() -> str:

@@ -200,6 +200,13 @@ class Deferred(NotInlined):
         """Define the symbols of a version; runs before machine code that calls them is loaded."""
         self.get_overload(args)
 
+    def compile_called(self) -> int:
+        """Compile or load the versions that kernels loaded so far may call; return how many are new."""
+        before = len(self.overloads)
+        for args in list(self._calls):
+            self.compile(args)
+        return len(self.overloads) - before
+
 
 @contextmanager
 def _signals_held() -> Iterator[None]:

@@ -61,7 +61,7 @@ def fiberless_tension(law, params, m, activation, length, speed):
 # ------------------------------------------------------------------------- curves of laws with a fibre
 
 
-@jit
+@from_python
 def length_curves(law, x):
     """Return the active force-length curve, its slope, the passive one and its slope at fibre length x [l_o]."""
     if law == MILLARD:
@@ -75,7 +75,7 @@ def length_curves(law, x):
     return NAN, NAN, NAN, NAN
 
 
-@jit
+@from_python
 def velocity_curve(law, v):
     """Return the force-velocity curve and its slope at fibre velocity v [v_max l_o]."""
     if law == MILLARD:
