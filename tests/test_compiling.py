@@ -7,6 +7,7 @@ import io
 import operator
 import sys
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from numba.core import types
@@ -86,7 +87,7 @@ NUMBERS = (types.float64, types.int64, types.int32, types.boolean, types.literal
     "symbol", ["add", "sub", "mul", "truediv", "floordiv", "pow", "lt", "eq", "and_", "lshift"]
 )
 def test_remembered_definitions_are_numbas(symbol: str) -> None:
-    context = cpu_target.typing_context
+    context: Any = cpu_target.typing_context
     context.refresh()
     function = context.resolve_value_type(getattr(operator, symbol))
 

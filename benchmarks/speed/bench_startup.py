@@ -40,14 +40,18 @@ def measure(arguments: list[str], package: Path, cache: str) -> tuple[float, flo
     kept = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA", "MJWRAP"))}
     environment = kept | {"PYTHONPATH": str(package), "XDG_CACHE_HOME": cache}
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run([sys.executable, *arguments], cwd=package, env=environment, check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, *arguments], cwd=package, env=environment, check=True, capture_output=True
+    )
     seconds, after = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_CHILDREN)
     return seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def main() -> None:
     """Measure the checkouts in turn and print a line for each program."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--package", type=Path, help="another checkout to measure, in turn with this one")
     options = parser.parse_args()

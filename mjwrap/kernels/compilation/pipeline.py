@@ -59,7 +59,8 @@ class KernelCompiler(CompilerBase):
 
 # For templates of a built-in function and types of arguments: the template that matched.
 _matched: dict[Any, Any] = {}
-_resolve: Callable[..., Any] = types.functions.BaseFunction.get_call_type
+_BuiltIn: Any = types.functions.BaseFunction
+_resolve: Callable[..., Any] = _BuiltIn.get_call_type
 _depth = 0
 
 
@@ -69,7 +70,7 @@ def faster() -> Iterator[None]:
     global _depth
     collects = _depth == 0 and gc.isenabled()
     if _depth == 0:
-        types.functions.BaseFunction.get_call_type = _call_type
+        _BuiltIn.get_call_type = _call_type
     if collects:
         gc.disable()
     _depth += 1
@@ -78,7 +79,7 @@ def faster() -> Iterator[None]:
     finally:
         _depth -= 1
         if _depth == 0:
-            types.functions.BaseFunction.get_call_type = _resolve
+            _BuiltIn.get_call_type = _resolve
         if collects:
             gc.enable()
 
