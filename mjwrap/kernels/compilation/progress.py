@@ -10,7 +10,7 @@ from numba.core import event
 
 from mjwrap.kernels.compilation import module_caches
 
-_OURS = "mjwrap."
+_OURS = ("mjwrap.kernels.", "mjwrap.plugin.")
 _FIRST = "mjwrap: compiling its kernels, which are kept for later runs ..."
 _FURTHER = (
     "mjwrap: compiling its kernels that were not used before ('mjwrap warmup' compiles all in advance) ..."
