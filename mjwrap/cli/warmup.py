@@ -23,11 +23,12 @@ import numpy as np
 
 import mjwrap as mw
 from mjwrap.cli.common.arguments import MODEL_HELP, add_json
-from mjwrap.cli.common.meanwhile import CompileCount, OtherProcess, can_help, laws
+from mjwrap.cli.common.meanwhile import OtherProcess, can_help, laws
 from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels.compilation import cache_folders, self_test
 from mjwrap.kernels.compilation.cache_folders import config
+from mjwrap.runs.compile_time import CompileClock
 from mjwrap.runs.models import load
 from mjwrap.system import CableSystem
 from mjwrap.text import counted
@@ -125,9 +126,9 @@ class Part:
 def compile_part(name: str, work: Callable[[], str | None]) -> Part:
     """Do a part of the work, which returns why it is left out, if so."""
     started = time.perf_counter()
-    with CompileCount() as count:
+    with CompileClock() as clock:
         left_out = work() or ""
-    return Part(name, count.compiled, time.perf_counter() - started, left_out)
+    return Part(name, clock.compiled, time.perf_counter() - started, left_out)
 
 
 def first_step() -> None:

@@ -9,12 +9,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from numba.core import event
-
 import mjwrap as mw
 from mjwrap.kernels.compilation import module_caches
 from mjwrap.kernels.compilation.cache_folders import config
 from mjwrap.kernels.musculotendon import dynamics
+from mjwrap.runs.compile_time import CompileClock
 
 _CODE = "from mjwrap.cli.common.meanwhile import counted; from {} import {} as work; counted(work)"
 
@@ -52,31 +51,9 @@ class OtherProcess:
 
 def counted(work: Callable[[], object]) -> None:
     """Call a function and print how many functions were compiled for it."""
-    count = CompileCount()
-    with count:
+    with CompileClock() as clock:
         work()
-    print(count.compiled)
-
-
-class CompileCount(event.Listener):
-    """Counts the functions that are compiled, not loaded, inside a with block."""
-
-    def __init__(self) -> None:
-        self.compiled = 0
-
-    def __enter__(self) -> CompileCount:
-        event.register("numba:compile", self)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        event.unregister("numba:compile", self)
-
-    def on_start(self, event: object) -> None:
-        """Count."""
-        self.compiled += 1
-
-    def on_end(self, event: object) -> None:
-        """Do nothing."""
+    print(clock.compiled)
 
 
 def can_help() -> bool:
