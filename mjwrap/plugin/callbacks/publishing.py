@@ -13,7 +13,8 @@ import math
 
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import float64_array, int32_array, int64_array, read_int32, read_int64
+from mjwrap.plugin.callbacks.memory import float64_array, int32_array, read_int32, read_int64
+from mjwrap.plugin.callbacks.saving import field, ints
 
 # sizes; COUNT: number of muscles that are shown; if it is 0, the rest is not filled
 COUNT, OUTPUTS, TENDONS, SENSORS, SENSOR_NUMBERS = range(5)
@@ -35,30 +36,19 @@ S_MUSCLE, S_OUTPUT, S_TENDON, S_FORCE, SHOWN = range(5)
 
 
 @jit
-def _ints(part, which, shape):
-    return int64_array(part + read_int64(part + 8 * which), shape)
-
-
-@jit
-def _field(part, which, owner, shape):
-    """Return the array of doubles to which a field of mjData, or mjModel, points."""
-    return float64_array(read_int64(owner + read_int64(part + 8 * which)), shape)
-
-
-@jit
 def publish_lengths(part, block, model, data, first_stage, length, velocity):
     """Write lengths and velocities of actuators and tendons; first_stage: also the sensors of the position stage.
 
     length [m], velocity [m/s] (n,): of the muscles. Where one of them is not finite, both are shown as zero.
     """
     outputs, tendons = read_int64(part + 8 * OUTPUTS), read_int64(part + 8 * TENDONS)
-    shown = _ints(part, A_SHOWN, (read_int64(part + 8 * COUNT), SHOWN))
-    gear = _field(part, GEAR, model, (outputs, 6))
-    actuator_length = _field(part, LENGTH, data, (outputs,))
-    actuator_velocity = _field(part, VELOCITY, data, (outputs,))
+    shown = ints(part, A_SHOWN, (read_int64(part + 8 * COUNT), SHOWN))
+    gear = field(part, GEAR, model, (outputs, 6))
+    actuator_length = field(part, LENGTH, data, (outputs,))
+    actuator_velocity = field(part, VELOCITY, data, (outputs,))
     ten_length, ten_velocity = (
-        _field(part, TEN_LENGTH, data, (tendons,)),
-        _field(part, TEN_VELOCITY, data, (tendons,)),
+        field(part, TEN_LENGTH, data, (tendons,)),
+        field(part, TEN_VELOCITY, data, (tendons,)),
     )
     for k in range(shown.shape[0]):
         m, out, tendon = shown[k, S_MUSCLE], shown[k, S_OUTPUT], shown[k, S_TENDON]
@@ -73,9 +63,9 @@ def publish_lengths(part, block, model, data, first_stage, length, velocity):
     if not first_stage or flags & read_int64(part + 8 * NO_SENSORS):
         return
     sensors = read_int64(part + 8 * SENSORS)
-    sensor = _ints(part, A_SENSOR, (sensors, 3))
+    sensor = ints(part, A_SENSOR, (sensors, 3))
     limits = float64_array(part + read_int64(part + 8 * A_LIMITS), (sensors, 2))
-    values = _field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
+    values = field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
     for j in range(sensors):
         k = sensor[j, 1]
         value = actuator_length[shown[k, S_OUTPUT]] if sensor[j, 2] != 0 else ten_length[shown[k, S_TENDON]]
@@ -92,11 +82,11 @@ def publish_forces(block, model, data):
     if count == 0:
         return
     outputs = read_int64(part + 8 * OUTPUTS)
-    shown = _ints(part, A_SHOWN, (count, SHOWN))
+    shown = ints(part, A_SHOWN, (count, SHOWN))
     tension = float64_array(
         block + read_int64(block + 8 * bk.A_TENSION), (read_int64(block + 8 * bk.MUSCLES),)
     )
-    gear, force = _field(part, GEAR, model, (outputs, 6)), _field(part, FORCE, data, (outputs,))
+    gear, force = field(part, GEAR, model, (outputs, 6)), field(part, FORCE, data, (outputs,))
     rownnz = int32_array(read_int64(data + read_int64(part + 8 * ROWNNZ)), (outputs,))
     for k in range(count):
         out, value = shown[k, S_OUTPUT], 0.0

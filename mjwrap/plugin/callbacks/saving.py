@@ -34,6 +34,12 @@ def ints(block, which, shape):
 
 
 @jit
+def field(part, which, owner, shape):
+    """Return the array of doubles to which a field of mjData, or mjModel, points."""
+    return float64_array(read_int64(owner + read_int64(part + 8 * which)), shape)
+
+
+@jit
 def state_of(block, data):
     """Return the instance's part of plugin_state."""
     start = read_int64(data + read_int64(block + 8 * bk.PLUGIN_STATE)) + 8 * read_int64(

@@ -12,7 +12,8 @@ from mjwrap.kernels.coupling.groups import Dofs, Transmissions
 from mjwrap.kernels.coupling.moments import write_transmissions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
-from mjwrap.plugin.callbacks.memory import float64_array, int32_array, int64_array, read_int32, read_int64
+from mjwrap.plugin.callbacks.memory import int32_array, read_int32, read_int64
+from mjwrap.plugin.callbacks.saving import field, floats, ints
 
 # sizes; COUNT: number of muscles whose actuators pull; if it is 0, all act by wrenches and the rest is not filled
 COUNT, DOFS, OUTPUTS, MOMENTS, TENDONS, TENDON_MOMENTS, SENSORS, SENSOR_NUMBERS = range(8)
@@ -35,22 +36,6 @@ HEAD = 24 + len(ARRAYS)
 
 
 @jit
-def _ints(part, which, shape):
-    return int64_array(part + read_int64(part + 8 * which), shape)
-
-
-@jit
-def _floats(part, which, shape):
-    return float64_array(part + read_int64(part + 8 * which), shape)
-
-
-@jit
-def _field(part, which, owner, shape):
-    """Return the array of doubles to which a field of mjData, or mjModel, points."""
-    return float64_array(read_int64(owner + read_int64(part + 8 * which)), shape)
-
-
-@jit
 def _indices(part, which, owner, shape):
     return int32_array(read_int64(owner + read_int64(part + 8 * which)), shape)
 
@@ -62,35 +47,35 @@ def transmit(part, block, model, data, first_stage, routes, poses, paths, states
     entries, tendons = read_int64(part + 8 * MOMENTS), read_int64(part + 8 * TENDONS)
     bodies = poses.body_rootid.shape[0]
     tree = Dofs(
-        _ints(part, A_LAST_DOF, (bodies,)),
-        _ints(part, A_PARENT, (dofs,)),
+        ints(part, A_LAST_DOF, (bodies,)),
+        ints(part, A_PARENT, (dofs,)),
         poses.body_rootid,
-        _field(part, CDOF, data, (dofs, 6)),
+        field(part, CDOF, data, (dofs, 6)),
         poses.subtree_com,
     )
     targets = Transmissions(
-        _ints(part, A_OUTPUT, (n,)),
-        _ints(part, A_TENDON, (n,)),
-        _ints(part, A_TENDON_ROW, (n,)),
-        _field(part, GEAR, model, (outputs, 6)),
-        _field(part, LENGTH, data, (outputs,)),
-        _field(part, VELOCITY, data, (outputs,)),
+        ints(part, A_OUTPUT, (n,)),
+        ints(part, A_TENDON, (n,)),
+        ints(part, A_TENDON_ROW, (n,)),
+        field(part, GEAR, model, (outputs, 6)),
+        field(part, LENGTH, data, (outputs,)),
+        field(part, VELOCITY, data, (outputs,)),
         _indices(part, ROWNNZ, data, (outputs,)),
         _indices(part, ROWADR, data, (outputs,)),
         _indices(part, COLIND, data, (entries,)),
-        _field(part, MOMENT, data, (entries,)),
-        _field(part, TEN_LENGTH, data, (tendons,)),
-        _field(part, TEN_VELOCITY, data, (tendons,)),
-        _field(part, TEN_J, data, (read_int64(part + 8 * TENDON_MOMENTS),)),
+        field(part, MOMENT, data, (entries,)),
+        field(part, TEN_LENGTH, data, (tendons,)),
+        field(part, TEN_VELOCITY, data, (tendons,)),
+        field(part, TEN_J, data, (read_int64(part + 8 * TENDON_MOMENTS),)),
     )
-    row = _floats(part, A_ROW, (dofs,))
+    row = floats(part, A_ROW, (dofs,))
     write_transmissions(routes, paths, tree, states.length, states.velocity, targets, row)
     flags = read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS))
     if not first_stage or flags & read_int64(part + 8 * NO_SENSORS):
         return
     sensors = read_int64(part + 8 * SENSORS)
-    sensor, limits = _ints(part, A_SENSOR, (sensors, 3)), _floats(part, A_LIMITS, (sensors, 2))
-    shown = _field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
+    sensor, limits = ints(part, A_SENSOR, (sensors, 3)), floats(part, A_LIMITS, (sensors, 2))
+    shown = field(part, SENSORDATA, data, (read_int64(part + 8 * SENSOR_NUMBERS),))
     for k in range(sensors):
         m = sensor[k, 1]
         value = targets.actuator_length[targets.output[m]]
