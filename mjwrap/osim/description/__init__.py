@@ -1,0 +1,1 @@
+"""What an .osim file says, as plain data, whatever version wrote it."""

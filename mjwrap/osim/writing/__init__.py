@@ -1,0 +1,1 @@
+"""Write an OpenSim model as MJCF, in full precision, with a report on every element."""
