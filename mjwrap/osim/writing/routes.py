@@ -1,0 +1,77 @@
+"""Paths as the stops of a muscle's tuple: sites and surfaces in the order in which the path meets them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from mjwrap.osim.description.paths import Path
+from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
+from mjwrap.osim.writing.segment_scan import Pose
+from mjwrap.osim.writing.segments import Seat, in_order, seat_wraps
+from mjwrap.osim.writing.sites import Elements, SiteWriter
+from mjwrap.osim.writing.wraps import WrittenWrap
+
+
+@dataclass(frozen=True)
+class Route:
+    """A path as written: the elements of a tuple, and the sites that a tendon of MuJoCo's can run over."""
+
+    elements: Elements
+    sites: list[str]
+
+
+class RouteWriter:
+    """Writes paths; poses: those at which the places of wraps are chosen."""
+
+    def __init__(
+        self, report: Report, sites: SiteWriter, wraps: Mapping[str, WrittenWrap], poses: Sequence[Pose]
+    ) -> None:
+        self._report, self._sites, self._wraps, self._poses = report, sites, wraps, poses
+
+    def route(self, owner: str, path: Path) -> Route | None:
+        """Write the points of a path; None, with an entry in the report, where it cannot be a path of mjwrap's."""
+        ends = path.points[:1] + path.points[-1:]
+        if len(path.points) < 2 or any(point.condition is not None for point in ends):
+            self._report.add(path.kind, owner, LEFT_OUT, "a path needs two ends that always belong to it")
+            return None
+        stops = [self._sites.stop(owner, point) for point in path.points]
+        seats = self._seats(owner, path)
+        elements: Elements = []
+        for gap, stop in enumerate(stops):
+            elements += stop.elements
+            for seat in in_order(seats, gap):
+                elements += self._wraps[seat.wrap].elements
+        return Route(elements, [stop.site for stop in stops if stop.always])
+
+    def _seats(self, owner: str, path: Path) -> list[Seat]:
+        kept: list[Seat] = []
+        for wrap in path.wraps:
+            if wrap.object not in self._wraps:
+                self._report.add("PathWrap", f"{owner}/{wrap.object}", LEFT_OUT, "its wrap object is left out")
+        for seat in seat_wraps(path, self._wraps, self._poses):
+            name = f"{owner}/{seat.wrap}"
+            points = path.points
+            if not self._wraps[seat.wrap].wrap.active:
+                self._report.add("PathWrap", name, LEFT_OUT, "its wrap object is not active in the file")
+                continue
+            if seat.beyond > 0.0 and seat.acted == 0.0:
+                self._report.add("PathWrap", name, LEFT_OUT,
+                                 f"the path meets the cylinder only beyond its ends, at {seat.beyond:.0%} of the "
+                                 f"sampled poses; OpenSim does not wrap it there", seat.beyond, "of poses")  # fmt: skip
+                continue
+            kept.append(seat)
+            places = " and ".join(f"{points[g].name} and {points[g + 1].name}" for g in seat.gaps)
+            text = f"between {places}; acts at {seat.acted:.0%} of {len(self._poses)} sampled poses"
+            remarks = [
+                (seat.missed, "on another segment at {:.1%}, where it is not kept"),
+                (seat.moved * (len(seat.gaps) > 1), "on one segment or another, as it moves, {:.1%} of poses"),
+                (seat.several, "several segments meet it at {:.1%}: OpenSim wraps one of them"),
+                (seat.inside, "an end of its segment is inside it at {:.1%}"),
+                (seat.beyond, "met beyond the cylinder's ends at {:.1%}: OpenSim's path runs through it there"),
+            ]  # fmt: skip
+            said = [remark.format(share) for share, remark in remarks if share > 0.0]
+            worst = max(seat.missed, seat.several, seat.inside, seat.beyond)
+            outcome = APPROXIMATED if worst > 0.0 else EXACT
+            self._report.add("PathWrap", name, outcome, "; ".join([text, *said]), worst, "of poses")
+        return kept

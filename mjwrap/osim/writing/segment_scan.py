@@ -1,0 +1,136 @@
+"""On which segments of a path a wrap object acts: at one pose, by where the straight segments meet its solid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.osim.description.bodies import Frame
+from mjwrap.osim.description.paths import Path, PathPoint, PathWrap, WrapObject
+from mjwrap.osim.writing.wraps import WrittenWrap, side_point
+from mjwrap.paths import Obstacle, solve_path
+
+Array = NDArray[np.float64]
+ON_SURFACE = 1e-4  # as in mjwrap: an end no deeper than this part of a radius lies on the surface
+SAMPLES = 65  # points of a segment, for a torus
+
+
+class Pose(NamedTuple):
+    """A pose of a model: position (3,) and rotation (3, 3) of every body in ground, and the coordinates' values."""
+
+    bodies: Mapping[str, tuple[Array, Array]]
+    values: Mapping[str, float]
+
+    def point(self, frame: Frame, local: Array | None = None) -> Array:
+        """Return the origin of a frame, or a point in it, in ground."""
+        inner = frame.position if local is None else frame.position + frame.rotation @ local
+        position, rotation = self.bodies[frame.body]
+        return position + rotation @ inner
+
+    def into(self, frame: Frame, point: Array) -> Array:
+        """Return a point of ground in a frame."""
+        position, rotation = self.bodies[frame.body]
+        return frame.rotation.T @ (rotation.T @ (point - position) - frame.position)
+
+
+class Act(NamedTuple):
+    """What a wrap does on one segment, from point `first` to point `last` of the path, at one pose.
+
+    hit: the straight segment meets the solid. touched: the path touches it, maybe because of its side only. added: by
+    how much that lengthens the path [m]. along: where on the segment, 0 to 1. inside: an end lies inside. beyond: the
+    path would touch a cylinder only beyond its ends.
+    """
+
+    first: int
+    last: int
+    hit: bool
+    touched: bool
+    added: float
+    along: float
+    inside: bool
+    beyond: bool
+
+
+def active_points(path: Path, pose: Pose) -> list[int]:
+    """Return the indices of the points that belong to a path at a pose."""
+    return [k for k, point in enumerate(path.points) if _counts(point, pose)]
+
+
+def _counts(point: PathPoint, pose: Pose) -> bool:
+    condition = point.condition
+    if condition is None:
+        return True
+    low, high = condition.range
+    return low <= pose.values.get(condition.coordinate, 0.0) <= high
+
+
+def place_of(point: PathPoint, pose: Pose) -> Array:
+    """Return where a point is at a pose, in ground."""
+    if point.moving is None:
+        return pose.point(point.frame)
+    names, functions = point.moving.coordinates, point.moving.functions
+    local = [float(f(pose.values.get(c, 0.0))) for c, f in zip(names, functions, strict=True)]
+    return pose.point(point.frame, np.array(local))
+
+
+def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, pose: Pose) -> list[Act]:
+    """Return what a wrap does at a pose on every segment of its range."""
+    there = [k for k in active_points(path, pose) if wrap.first <= k <= wrap.last]
+    places = {k: pose.into(written.wrap.frame, place_of(path.points[k], pose)) for k in there}
+    return [
+        _act(written, first, last, places[first], places[last])
+        for first, last in zip(there, there[1:], strict=False)
+    ]
+
+
+def _act(written: WrittenWrap, first: int, last: int, start: Array, end: Array) -> Act:
+    wrap = written.wrap
+    depth, along = _deepest(wrap, start, end)
+    inside = min(_height(wrap, start[None])[0], _height(wrap, end[None])[0]) < -ON_SURFACE
+    hit = depth < 0.0
+    nothing = Act(first, last, hit, False, 0.0, along, inside, False)
+    side = side_point(wrap) if written.side else None
+    if inside or not (hit or (side is not None and wrap.kind == "WrapCylinder")):
+        return nothing
+    hint = None if side is None else tuple(side)
+    solution = solve_path(start, end, [Obstacle(written.surface, hint=hint)])
+    contact = solution.contacts[0]
+    if not contact.active or contact.P is None or contact.Q is None:
+        return nothing._replace(touched=hit and not solution.converged)
+    straight = end - start
+    along = float(straight @ (0.5 * (contact.P + contact.Q) - start) / (straight @ straight))
+    beyond = wrap.kind == "WrapCylinder" and min(abs(contact.P[2]), abs(contact.Q[2])) > 0.5 * wrap.dimensions[1]
+    added = solution.length - float(np.linalg.norm(straight))
+    return Act(first, last, hit, not beyond, added, along, inside, beyond)
+
+
+def _height(wrap: WrapObject, points: Array) -> Array:
+    """Return how far points (n, 3) are outside a wrap object [radii]; negative inside."""
+    size = wrap.dimensions
+    match wrap.kind:
+        case "WrapCylinder":
+            return np.hypot(points[:, 0], points[:, 1]) / size[0] - 1.0
+        case "WrapTorus":
+            ring = np.hypot(points[:, 0], points[:, 1]) - max(size[:2])
+            return np.hypot(ring, points[:, 2]) / min(size[:2]) - 1.0
+        case "WrapEllipsoid":
+            return np.linalg.norm(points / np.array(size[:3]), axis=1) - 1.0
+        case _:
+            return np.linalg.norm(points, axis=1) / size[0] - 1.0
+
+
+def _deepest(wrap: WrapObject, start: Array, end: Array) -> tuple[float, float]:
+    """Return the least height [radii] on a straight segment, and where it is, 0 to 1."""
+    if wrap.kind == "WrapTorus":
+        along = np.linspace(0.0, 1.0, SAMPLES)
+    else:
+        scale = {"WrapEllipsoid": np.array(wrap.dimensions[:3]), "WrapCylinder": np.array([1.0, 1.0, np.inf])}
+        a, b = (point / scale.get(wrap.kind, 1.0) for point in (start, end))
+        square = float((b - a) @ (b - a))
+        along = np.array([0.5 if square == 0.0 else min(1.0, max(0.0, float(-a @ (b - a)) / square))])
+    heights = _height(wrap, start + along[:, None] * (end - start))
+    best = int(np.argmin(heights))
+    return float(heights[best]), float(along[best])
