@@ -16,7 +16,8 @@ class Node:
 
     inside: the string must meet the solid, as with a side site inside, and is not kept out of it. sizes: the numeric
     that gives the surface's sizes, -1 if the geom gives them. turn: if a tendon's side site picks the way round a
-    cylinder, the angle by which the string goes round at the reference pose (`side_rules.py`), else 0.
+    cylinder, the angle by which the string goes round at the reference pose (`side_rules.py`), else 0. side: the hint
+    site is a side, on which the path passes the surface at every pose.
     """
 
     site: int = -1
@@ -26,11 +27,12 @@ class Node:
     inside: bool = False
     sizes: int = -1
     turn: float = field(default=0.0, compare=False)
+    side: bool = False
 
     def __repr__(self) -> str:
         if self.surface is None:
             return f"Node(site {self.site})"
-        hint = f", hint site {self.hint_site}" if self.hint_site >= 0 else ""
+        hint = f", {'side' if self.side else 'hint'} site {self.hint_site}" if self.hint_site >= 0 else ""
         return f"Node(geom {self.geom}: {self.surface!r}{hint}{', held inside' * self.inside})"
 
 

@@ -65,9 +65,10 @@ def muscle_xml(
         model: the compiled model, in which the names are looked up.
         name: name of the muscle.
         route: stops in order, separated by commas. The first and the last are sites; other sites are via points. A geom
-            may have a hint, GEOM:SITE, near which the path touches it; GEOM@SHAPE=SIZE/SIZE gives it another shape,
-            with sizes [m] as in docs/declaring.md; GEOM@finite wraps a cylinder geom as long as it is drawn. Where a
-            site and a geom have the same name, write site/NAME or geom/NAME.
+            may have a hint, GEOM:SITE, near which the path touches it, or a side, GEOM:side=SITE, on which the path
+            passes it at every pose; GEOM@SHAPE=SIZE/SIZE gives it another shape, with sizes [m] as in
+            docs/declaring.md; GEOM@finite wraps a cylinder geom as long as it is drawn. Where a site and a geom have
+            the same name, write site/NAME or geom/NAME.
         law: "degroote_fregly_2016", "millard_2012", "mujoco" or "path_actuator"; None for the one whose parameters
             are given.
         parameters: of the law, by the names of docs/declaring.md, such as max_isometric_force, and "tendon_model" and
@@ -241,7 +242,9 @@ def _text(muscle: _Muscle) -> str:
             custom.append(_element("numeric", name=numeric, data=_digits(stop.sizes)))
             elements.append(_element("element", objtype="numeric", objname=numeric))
         if stop.hint:
-            elements.append(_element("element", objtype="site", objname=stop.hint, prm="1"))
+            elements.append(
+                _element("element", objtype="site", objname=stop.hint, prm="2" if stop.side else "1")
+            )
     for key, values in muscle.numbers.items():
         if key in NUMERICS:
             custom.append(_element("numeric", name=f"mjwrap_{name}_{key}", data=_digits(values)))

@@ -21,7 +21,7 @@ class Stop(NamedTuple):
     """One element of a list of stops: id of a site, geom, hint (a site) or sizes (a numeric), or a pulley's divisor.
 
     finite: a cylinder geom has the length with which it is drawn, not an infinite one. inside: the string must meet the
-    geom's solid. turn: of a hint, see `Node`.
+    geom's solid. turn: of a hint, see `Node`. side: the hint is a side that holds at every pose.
     """
 
     kind: Literal["site", "geom", "hint", "sizes", "pulley"]
@@ -30,6 +30,7 @@ class Stop(NamedTuple):
     finite: bool = False
     inside: bool = False
     turn: float = 0.0
+    side: bool = False
 
 
 class _Place(NamedTuple):
@@ -41,6 +42,7 @@ class _Place(NamedTuple):
     inside: bool = False
     hint: int = -1
     turn: float = 0.0
+    side: bool = False
     sizes: int = -1
 
 
@@ -128,12 +130,13 @@ def _completed(model: mujoco.MjModel, muscle: str, place: _Place | None, stop: S
     """Return a geom's place with a hint or sizes added."""
     if place is not None and place.geom >= 0:
         if stop.kind == "hint" and place.hint < 0:
-            return place._replace(hint=stop.index, turn=stop.turn)
+            return place._replace(hint=stop.index, turn=stop.turn, side=stop.side)
         if stop.kind == "sizes" and place.sizes < 0:
             return place._replace(sizes=stop.index)
     before = _describe(model, place) if place else "nothing"
     if stop.kind == "hint":
-        what = f"site '{name_of(model, OBJ.mjOBJ_SITE, stop.index)}' is marked as a hint (prm=1) and"
+        mark = "side (prm=2)" if stop.side else "hint (prm=1)"
+        what = f"site '{name_of(model, OBJ.mjOBJ_SITE, stop.index)}' is marked as a {mark} and"
     else:
         what = f"numeric '{name_of(model, OBJ.mjOBJ_NUMERIC, stop.index)}' declares a surface and"
     raise ModelError(
@@ -155,13 +158,21 @@ def _node(model: mujoco.MjModel, muscle: str, place: _Place) -> Node:
         inside=place.inside,
         sizes=place.sizes,
         turn=place.turn,
+        side=place.side,
     )
 
 
 def _describe(model: mujoco.MjModel, place: _Place) -> str:
     if place.geom < 0:
         return f"site '{name_of(model, OBJ.mjOBJ_SITE, place.site)}'"
-    said = [word for word, given in (("a hint", place.hint >= 0), ("sizes", place.sizes >= 0)) if given]
+    said = [
+        word
+        for word, given in (
+            ("a side" if place.side else "a hint", place.hint >= 0),
+            ("sizes", place.sizes >= 0),
+        )
+        if given
+    ]
     return f"geom '{name_of(model, OBJ.mjOBJ_GEOM, place.geom)}'" + " with " * bool(said) + " and ".join(said)
 
 

@@ -95,7 +95,7 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 def kernel_rows(node: Node) -> list[Array]:
     """Return the kernels' rows of a stop, for a cold start; several if a string may touch its surface several times."""
     if node.surface is not None:
-        rows = surface_rows(node.surface, node.inside)
+        rows = surface_rows(node.surface, node.inside, node.side)
         rows[:, layout.HINT_TURN] = node.turn
         return list(rows)
     row = np.zeros(layout.ROW)

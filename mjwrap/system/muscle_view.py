@@ -208,6 +208,7 @@ def route_text(model: mujoco.MjModel, route: Route) -> str:
             stops.append(name_of(model, _SITE, node.site))
         else:
             hint = f", side {name_of(model, _SITE, node.hint_site)}" if node.hint_site >= 0 else ""
+            hint += " at every pose" * node.side
             kind = type(node.surface).__name__.lower()
             stops.append(f"{name_of(model, _GEOM, node.geom)} ({kind}{hint}{', held inside' * node.inside})")
     stops.append(name_of(model, _SITE, route.insertion))

@@ -54,6 +54,7 @@ def _stop(model: mujoco.MjModel, node: Node) -> str:
     if node.surface is None:
         return _site(model, node.site)
     side = f", side {_site(model, node.hint_site)}" if node.hint_site >= 0 else ""
+    side += " at every pose" * node.side
     held = ", held inside" if node.inside else ""
     return f"{_geom(model, node.geom)} ({type(node.surface).__name__.lower()}{side}{held})"
 
@@ -96,5 +97,6 @@ def _stop_values(model: mujoco.MjModel, node: Node) -> dict[str, Any]:
         "surface": type(node.surface).__name__,
         "sizes": list(node.surface.dims),
         "side_site": _site(model, node.hint_site) if node.hint_site >= 0 else None,
+        "side_at_every_pose": node.side,
         "held_inside": node.inside,
     }
