@@ -55,23 +55,41 @@ class RouteWriter:
             if not self._wraps[seat.wrap].wrap.active:
                 self._report.add("PathWrap", name, LEFT_OUT, "its wrap object is not active in the file")
                 continue
-            if seat.beyond > 0.0 and seat.acted == 0.0:
-                self._report.add("PathWrap", name, LEFT_OUT,
-                                 f"the path meets the cylinder only beyond its ends, at {seat.beyond:.0%} of the "
-                                 f"sampled poses; OpenSim does not wrap it there", seat.beyond, "of poses")  # fmt: skip
+            reason = _never(seat)
+            if reason:
+                self._report.add("PathWrap", name, LEFT_OUT, reason)
                 continue
             kept.append(seat)
-            places = " and ".join(f"{points[g].name} and {points[g + 1].name}" for g in seat.gaps)
-            text = f"between {places}; acts at {seat.acted:.0%} of {len(self._poses)} sampled poses"
-            remarks = [
-                (seat.missed, "on another segment at {:.1%}, where it is not kept"),
-                (seat.moved * (len(seat.gaps) > 1), "on one segment or another, as it moves, {:.1%} of poses"),
-                (seat.several, "several segments meet it at {:.1%}: OpenSim wraps one of them"),
-                (seat.inside, "an end of its segment is inside it at {:.1%}"),
-                (seat.beyond, "met beyond the cylinder's ends at {:.1%}: OpenSim's path runs through it there"),
-            ]  # fmt: skip
-            said = [remark.format(share) for share, remark in remarks if share > 0.0]
-            worst = max(seat.missed, seat.several, seat.inside, seat.beyond)
-            outcome = APPROXIMATED if worst > 0.0 else EXACT
-            self._report.add("PathWrap", name, outcome, "; ".join([text, *said]), worst, "of poses")
+            self._report_seat(name, path, seat)
         return kept
+
+    def _report_seat(self, name: str, path: Path, seat: Seat) -> None:
+        points = path.points
+        places = " and ".join(f"{points[g].name} and {points[g + 1].name}" for g in seat.gaps)
+        text = f"between {places}; acts at {seat.acted:.0%} of {len(self._poses)} sampled poses"
+        remarks = [
+            (seat.missed, "on another segment at {:.1%}, which is not kept"),
+            (seat.moved * (len(seat.gaps) > 1), "it moves from one segment to another, at {:.1%}"),
+            (seat.several, "it meets several segments at {:.1%}, and OpenSim wraps the first"),
+            (seat.inside, "an end of its segment is inside it at {:.1%}, where OpenSim does not wrap it"),
+            (seat.beyond, "the path meets it only beyond the ends of the cylinder at {:.1%}, where OpenSim does not "
+                          "wrap it and mjwrap does"),
+        ]  # fmt: skip
+        said = [remark.format(share) for share, remark in remarks if share > 0.0]
+        outcome = APPROXIMATED if max(seat.missed, seat.inside, seat.beyond) > 0.0 else EXACT
+        size = seat.error if max(seat.missed, seat.beyond) > 0.0 else float("nan")
+        self._report.add("PathWrap", name, outcome, "; ".join([text, *said]), size, "m" * (size == size))
+
+
+def _never(seat: Seat) -> str:
+    """Return why OpenSim's wrap never acts although the path meets the surface, so that it is left out; or nothing."""
+    if seat.acted > 0.0:
+        return ""
+    if seat.beyond > 0.0:
+        return (
+            f"the path meets the cylinder only beyond its ends, at {seat.beyond:.0%} of the sampled poses, and OpenSim "
+            f"does not wrap it there"
+        )
+    if seat.inside >= 1.0:
+        return "an end of its segment is inside it at every sampled pose, and OpenSim does not wrap it then"
+    return ""

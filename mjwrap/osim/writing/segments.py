@@ -22,9 +22,11 @@ from mjwrap.osim.writing.wraps import WrittenWrap
 class Seat:
     """Where a wrap of a path was put, and at which share of the sampled poses what happens.
 
-    gaps: it lies between points g and g + 1, for every g listed. acted: it acts. moved: it acts on a segment that is
-    not the first of `gaps`. missed: it acts on none of `gaps`. several: it would act on more than one segment, where
-    OpenSim takes one. inside: an end of its segment is inside. beyond: only its ends, which are not there, are met.
+    gaps: it lies between points g and g + 1, for every g listed. acted: OpenSim's wrap acts. moved: on a segment that
+    is not the first of `gaps`. missed: on none of `gaps`. several: it meets more than one segment, and OpenSim wraps
+    the first. inside: an end of its segment is inside, and OpenSim does not wrap it. beyond: the path meets a cylinder
+    only beyond its ends, and OpenSim does not wrap it. error: the largest difference of length that `missed` and
+    `beyond` make [m].
     """
 
     wrap: str
@@ -35,6 +37,7 @@ class Seat:
     several: float = 0.0
     inside: float = 0.0
     beyond: float = 0.0
+    error: float = 0.0
     along: dict[int, float] = field(default_factory=dict)  # gap -> mean place on the segment, 0 to 1
 
 
@@ -57,10 +60,12 @@ def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Pose]) -
     total = max(len(poses), 1)
     seat.acted = len(acting) / total
     seat.several = sum(sum(act.hit and act.touched for act in acts) > 1 for acts in scans) / total
-    seat.beyond = sum(_best(acts) is None and any(act.beyond for act in acts) for acts in scans) / total
     seat.gaps = _covering(acting, several=not written.side) or [_nearest(path, index, scans)]
     seat.moved = sum(not act.first <= seat.gaps[0] < act.last for act in acting) / total
-    seat.missed = sum(not any(act.first <= gap < act.last for gap in seat.gaps) for act in acting) / total
+    missed = [act for act in acting if not _lies_in(act, seat.gaps)]
+    beyond = [act for acts in scans for act in acts if act.beyond and _lies_in(act, seat.gaps)]
+    seat.missed, seat.beyond = len(missed) / total, min(1.0, len(beyond) / total)
+    seat.error = max((act.added for act in (*missed, *beyond)), default=0.0)
     for gap in seat.gaps:
         here = [act for acts in scans for act in acts if act.first <= gap < act.last]
         seat.inside = max(seat.inside, sum(act.inside for act in here) / total)
@@ -68,6 +73,10 @@ def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Pose]) -
         seat.along[gap] = float(np.mean(places)) if places else 0.5
     seat.gaps.sort()
     return seat
+
+
+def _lies_in(act: Act, gaps: Sequence[int]) -> bool:
+    return any(act.first <= gap < act.last for gap in gaps)
 
 
 def _best(acts: Sequence[Act]) -> Act | None:
