@@ -16,6 +16,7 @@ from .errors import GeometryError as GeometryError
 from .errors import MissingPackageError as MissingPackageError
 from .errors import MjwrapError as MjwrapError
 from .errors import ModelError as ModelError
+from .errors import OsimError as OsimError
 from .errors import PathError as PathError
 from .errors import RecordingError as RecordingError
 from .errors import SignalError as SignalError

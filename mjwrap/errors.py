@@ -16,6 +16,13 @@ class ModelError(MjwrapError, ValueError):
     """
 
 
+class OsimError(ModelError):
+    """An .osim file cannot be read or imported.
+
+    The message names the file, the line and the element, and says what to do.
+    """
+
+
 class GeometryError(MjwrapError, ValueError):
     """A surface or a point has a size or a position with which no path can be computed.
 
