@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,8 +139,9 @@ class HuntCrossley:
     name: str
     kind: str
     shapes: tuple[str, ...]
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float]  # of the first group of shapes, with transition_velocity
     active: bool = True
+    by_shape: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # where groups differ
 
 
 @dataclass(frozen=True)
