@@ -1,0 +1,154 @@
+"""Bodies, joints and couplings of an OpenSim model as MJCF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mjwrap.osim.description.bodies import Coordinate
+from mjwrap.osim.description.functions import Array, Piecewise, linear
+from mjwrap.osim.description.model import OsimModel
+from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
+from mjwrap.osim.writing.couplings import write_coupling, write_hold
+from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.drivers import Drivers, drivers_of
+from mjwrap.osim.writing.inertias import Written, written_inertias
+from mjwrap.osim.writing.motions import Motion, evaluated
+from mjwrap.osim.writing.piece_algebra import composed
+from mjwrap.osim.writing.rotations import quaternion
+from mjwrap.osim.writing.tree import Branch, branches_of
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """What was written: the tree, the joints of the coordinates, and the inertias."""
+
+    branches: list[Branch]
+    drivers: Drivers
+    inertias: dict[str, Written]
+
+
+class _Writer:
+    def __init__(self, document: Document, report: Report, drivers: Drivers) -> None:
+        self.document, self.report, self.drivers = document, report, drivers
+        self.taken = set(drivers.coordinates)
+        self.followers: list[tuple[str, float, str, Piecewise]] = []  # joint, reference, coordinate, function
+        self.shown: set[str] = set()
+
+    def name(self, wanted: str) -> str:
+        name = "_".join(wanted.split())
+        while name in self.taken:
+            name += "_"
+        self.taken.add(name)
+        return name
+
+    def body(self, branch: Branch, inertia: Written) -> None:
+        """Write a body with its joints and its inertia."""
+        values = self.drivers.value
+        home = evaluated(branch.chain, values)
+        element = self.document.add(
+            self.document.bodies[branch.parent], "body", name=branch.body, pos=home[:3, 3], quat=quaternion(home[:3, :3])
+        )
+        self.document.bodies[branch.body] = element
+        after = np.eye(4)  # the body in the frame that a motion has moved
+        joints = []
+        for step in reversed(branch.chain):
+            if isinstance(step, Motion):
+                joints.append(self.joint(branch, step, after))
+                after = step.transform(float(step.function(values(step.coordinate)))) @ after
+            else:
+                after = step @ after
+        for attributes in reversed(joints):
+            self.document.add(element, "joint", **attributes)
+        if inertia.properties is not None:
+            moments, axes = inertia.properties.principal()
+            self.document.add(element, "inertial", pos=inertia.properties.center, mass=inertia.properties.mass,
+                              quat=quaternion(axes), diaginertia=moments)  # fmt: skip
+
+    def joint(self, branch: Branch, motion: Motion, after: Array) -> dict[str, object]:
+        """Return the attributes of a motion's joint; remember whether it follows a coordinate."""
+        drivers, coordinate = self.drivers, motion.coordinate
+        axis = after[:3, :3].T @ motion.axis
+        attributes: dict[str, object] = {"type": "hinge" if motion.turn else "slide"}
+        if motion.turn:
+            attributes["pos"] = -after[:3, :3].T @ after[:3, 3]
+        value = drivers.value(coordinate)
+        if drivers.carriers.get(coordinate) is motion:
+            name = coordinate
+            self.shown.add(coordinate)
+            axis = axis * float(motion.function(0.0, 1))
+            reference = value
+            attributes.update(self.limits(drivers.coordinates[coordinate]))
+        else:
+            name = self.name(f"{branch.joint.name}_{motion.name}")
+            reference = float(motion.function(value))
+            self.followers.append((name, reference, coordinate, motion.function))
+        return {"name": name, **attributes, "axis": axis, "ref": reference}
+
+    def limits(self, coordinate: Coordinate) -> dict[str, object]:
+        """Return range and limit of a coordinate's joint; what follows others, or starts outside, has no limit."""
+        low, high = coordinate.range
+        if not low < high:
+            return {}
+        limited = coordinate.clamped and coordinate.name not in self.drivers.couplers
+        inside = low <= self.drivers.value(coordinate.name) <= high
+        return {"range": (low, high), "limited": limited and inside and not coordinate.locked}
+
+    def carrier(self, coordinate: Coordinate, least: float) -> None:
+        """Write a body whose only joint shows a coordinate that no axis shows."""
+        name = coordinate.name
+        turn = coordinate.motion != "translational"
+        element = self.document.add("worldbody", "body", name=self.name(f"{name}_carrier"), gravcomp=1)
+        self.document.add(element, "joint", name=name, type="hinge" if turn else "slide", axis=(1, 0, 0),
+                          ref=self.drivers.value(name), **self.limits(coordinate))  # fmt: skip
+        self.document.add(element, "inertial", pos=(0, 0, 0), mass=least, diaginertia=[least] * 3)
+        self.report.add("Coordinate", name, APPROXIMATED,
+                        f"no axis turns or slides one to one with it, so a body of its own shows it, of {least:.3g} kg "
+                        f"and {least:.3g} kg m^2", least, "kg m^2" if turn else "kg")  # fmt: skip
+
+    def couplings(self) -> None:
+        """Write the equalities of axes that follow coordinates, and of coordinates that follow others."""
+        drivers = self.drivers
+        for name in drivers.coordinates:
+            dependence = drivers.dependence(name)
+            if dependence is not None and name in self.shown:
+                self.follow(name, drivers.value(name), *dependence)
+        for joint, reference, coordinate, function in self.followers:
+            self.follow(joint, reference, coordinate, function)
+
+    def follow(self, joint: str, reference: float, coordinate: str, function: Piecewise) -> None:
+        driver = self.drivers.driver(coordinate)
+        assert driver is not None
+        leader, inner = driver
+        total = function if inner is None else composed(function, inner)
+        low, high = self.drivers.coordinates[leader].range
+        at = self.drivers.value(leader)
+        low, high = min(low, at), max(high, at)
+        room = 0.1 * (high - low)
+        written = write_coupling(self.document, (joint, reference), (leader, at), total, (low - room, high + room))
+        count = len(written.origins)
+        self.report.add("Coupling", joint, APPROXIMATED if written.error > 0.0 else EXACT,
+                        f"follows {leader} by {count} polynomial{'s' * (count > 1)}", written.error or float("nan"),
+                        "rad or m" if written.error else "")  # fmt: skip
+
+
+def write_bodies(document: Document, model: OsimModel, report: Report) -> Skeleton:
+    """Write bodies, joints, coordinates and couplers; return what later parts need to know of them."""
+    branches = branches_of(model)
+    drivers = drivers_of(model, branches)
+    inertias = written_inertias(model.bodies, branches)
+    writer = _Writer(document, report, drivers)
+    for branch in branches:
+        if not (branch.copy_of and branch.fixed):
+            writer.body(branch, inertias[branch.body])
+    least = 1e-9 * (sum(body.mass for body in model.bodies) or 1.0)
+    moving = {step.coordinate for branch in branches for step in branch.chain if isinstance(step, Motion)}
+    needed = moving | {coupler.independent[0] for coupler in drivers.couplers.values()}
+    for name, coordinate in drivers.coordinates.items():
+        if name not in writer.shown and name not in drivers.couplers and name in needed:
+            writer.carrier(coordinate, least)
+            drivers.carriers.setdefault(name, Motion(True, np.array([1.0, 0.0, 0.0]), name, linear(1.0), ""))
+            writer.shown.add(name)
+    writer.couplings()
+    return Skeleton(branches, drivers, inertias)
