@@ -7,7 +7,7 @@ import numpy as np
 from mjwrap.osim.description.paths import WrapObject
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.document import Document
-from mjwrap.osim.writing.quaternions import quaternion
+from mjwrap.osim.writing.rotations import quaternion
 from mjwrap.osim.writing.unique_names import UniqueNames
 from mjwrap.surfaces import Cylinder, Ellipsoid, Sphere, Surface, Torus
 
