@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from mjwrap.osim.description.paths import Path
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
-from mjwrap.osim.writing.segment_scan import Pose
+from mjwrap.osim.writing.segment_scan import Sample
 from mjwrap.osim.writing.segments import Seat, in_order, seat_wraps
 from mjwrap.osim.writing.sites import Elements, SiteWriter
 from mjwrap.osim.writing.wraps import WrittenWrap
@@ -25,7 +25,7 @@ class RouteWriter:
     """Writes paths; poses: those at which the places of wraps are chosen."""
 
     def __init__(
-        self, report: Report, sites: SiteWriter, wraps: Mapping[str, WrittenWrap], poses: Sequence[Pose]
+        self, report: Report, sites: SiteWriter, wraps: Mapping[str, WrittenWrap], poses: Sequence[Sample]
     ) -> None:
         self._report, self._sites, self._wraps, self._poses = report, sites, wraps, poses
 

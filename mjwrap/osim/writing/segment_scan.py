@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.osim.description.bodies import Frame
-from mjwrap.osim.description.paths import Path, PathPoint, PathWrap, WrapObject
+from mjwrap.osim.description.paths import Path, PathWrap, WrapObject
+from mjwrap.osim.kinematics import Pose, frame_pose, point_position
+from mjwrap.osim.kinematics.paths import holds
 from mjwrap.osim.writing.wraps import WrittenWrap, side_point
 from mjwrap.paths import Obstacle, solve_path
 
@@ -18,22 +19,11 @@ ON_SURFACE = 1e-4  # as in mjwrap: an end no deeper than this part of a radius l
 SAMPLES = 65  # points of a segment, for a torus
 
 
-class Pose(NamedTuple):
-    """A pose of a model: position (3,) and rotation (3, 3) of every body in ground, and the coordinates' values."""
+class Sample(NamedTuple):
+    """A pose of a model: the pose of every body in ground, and the values of all coordinates."""
 
-    bodies: Mapping[str, tuple[Array, Array]]
+    bodies: Mapping[str, Pose]
     values: Mapping[str, float]
-
-    def point(self, frame: Frame, local: Array | None = None) -> Array:
-        """Return the origin of a frame, or a point in it, in ground."""
-        inner = frame.position if local is None else frame.position + frame.rotation @ local
-        position, rotation = self.bodies[frame.body]
-        return position + rotation @ inner
-
-    def into(self, frame: Frame, point: Array) -> Array:
-        """Return a point of ground in a frame."""
-        position, rotation = self.bodies[frame.body]
-        return frame.rotation.T @ (rotation.T @ (point - position) - frame.position)
 
 
 class Act(NamedTuple):
@@ -54,32 +44,19 @@ class Act(NamedTuple):
     beyond: bool
 
 
-def active_points(path: Path, pose: Pose) -> list[int]:
+def active_points(path: Path, sample: Sample) -> list[int]:
     """Return the indices of the points that belong to a path at a pose."""
-    return [k for k, point in enumerate(path.points) if _counts(point, pose)]
+    return [k for k, point in enumerate(path.points) if holds(point.condition, sample.values)]
 
 
-def _counts(point: PathPoint, pose: Pose) -> bool:
-    condition = point.condition
-    if condition is None:
-        return True
-    low, high = condition.range
-    return low <= pose.values.get(condition.coordinate, 0.0) <= high
-
-
-def place_of(point: PathPoint, pose: Pose) -> Array:
-    """Return where a point is at a pose, in ground."""
-    if point.moving is None:
-        return pose.point(point.frame)
-    names, functions = point.moving.coordinates, point.moving.functions
-    local = [float(f(pose.values.get(c, 0.0))) for c, f in zip(names, functions, strict=True)]
-    return pose.point(point.frame, np.array(local))
-
-
-def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, pose: Pose) -> list[Act]:
+def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, sample: Sample) -> list[Act]:
     """Return what a wrap does at a pose on every segment of its range."""
-    there = [k for k in active_points(path, pose) if wrap.first <= k <= wrap.last]
-    places = {k: pose.into(written.wrap.frame, place_of(path.points[k], pose)) for k in there}
+    there = [k for k in active_points(path, sample) if wrap.first <= k <= wrap.last]
+    frame = frame_pose(sample.bodies, written.wrap.frame)
+    places = {
+        k: frame.rotation.T @ (point_position(path.points[k], sample.bodies, sample.values) - frame.position)
+        for k in there
+    }
     return [
         _act(written, first, last, places[first], places[last])
         for first, last in zip(there, there[1:], strict=False)

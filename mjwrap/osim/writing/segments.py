@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mjwrap.osim.description.paths import Path
-from mjwrap.osim.writing.segment_scan import Act, Pose, acts_of
+from mjwrap.osim.writing.segment_scan import Act, Sample, acts_of
 from mjwrap.osim.writing.wraps import WrittenWrap
 
 
@@ -41,7 +41,7 @@ class Seat:
     along: dict[int, float] = field(default_factory=dict)  # gap -> mean place on the segment, 0 to 1
 
 
-def seat_wraps(path: Path, wraps: Mapping[str, WrittenWrap], poses: Sequence[Pose]) -> list[Seat]:
+def seat_wraps(path: Path, wraps: Mapping[str, WrittenWrap], poses: Sequence[Sample]) -> list[Seat]:
     """Return where every wrap of a path lies, in the file's order; those that are left out are missing."""
     return [_seat(path, k, wraps[wrap.object], poses) for k, wrap in enumerate(path.wraps) if wrap.object in wraps]
 
@@ -51,7 +51,7 @@ def in_order(seats: Sequence[Seat], gap: int) -> list[Seat]:
     return sorted((seat for seat in seats if gap in seat.gaps), key=lambda seat: seat.along.get(gap, 0.5))
 
 
-def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Pose]) -> Seat:
+def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Sample]) -> Seat:
     wrap = path.wraps[index]
     seat = Seat(wrap.object)
     scans = [acts_of(path, wrap, written, pose) for pose in poses]
