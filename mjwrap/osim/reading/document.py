@@ -32,7 +32,8 @@ def read_document(path: Path) -> Node:
     document.version = int(text)
     if document.version < OLDEST:
         raise OsimError(
-            f"{path}: has document version {document.version}, older than OpenSim 2.0; open it in OpenSim and save it again"
+            f"{path}: has document version {document.version}, older than OpenSim 2.0; "
+            "open it in OpenSim and save it again"
         )
     _apply_defaults(root)
     return root

@@ -111,6 +111,12 @@ def _fixed_axes(
     if len(known) < count:
         raise node.error("two of its coordinates have the same name")
     axes = [_still(i) for i in range(6)]
+    if (
+        node.tag == SCAPULOTHORACIC
+    ):  # abduction, elevation, upward rotation; the fourth, winging, comes after them
+        turns = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        for i, (turn, coordinate) in enumerate(zip(turns, known.values(), strict=False)):
+            axes[i] = Axis(np.array(turn), (coordinate,), linear(1.0))
     for coordinate, i in zip(known.values(), driven, strict=False):
         axes[i] = Axis(axes[i].axis, (coordinate,), linear(1.0))
     return axes, known

@@ -51,7 +51,7 @@ class _Reader:
                 places.add(node)
         joint_elements = joint_nodes(model)
         self._name_coordinates(joint_elements)
-        names = _unique_names(joint_elements, "joint")
+        names = _unique_names(joint_elements)
         joints = [
             read_joint(n, places, self.coordinate_names, name)
             for n, name in zip(joint_elements, names, strict=True)
@@ -59,7 +59,7 @@ class _Reader:
         joints = self._connected(bodies, joints, joint_elements)
         coordinates = {c.name: c for joint in joints for c in joint.coordinates}
         wrap_elements = wrap_nodes(model)
-        wrap_names = _unique_names(wrap_elements, "wrap")
+        wrap_names = _unique_names(wrap_elements)
         wraps = tuple(read_wrap(n, places, name) for n, name in zip(wrap_elements, wrap_names, strict=True))
         by_name: dict[str, str] = {}
         for node, name in zip(wrap_elements, wrap_names, strict=True):
@@ -69,12 +69,12 @@ class _Reader:
         ]
         known = Known(places, self.coordinate, coordinates, by_name, frozenset(s.name for s in shapes))
         force_elements = model.objects("ForceSet")
-        force_names = _unique_names(force_elements, "force")
+        force_names = _unique_names(force_elements)
         forces = tuple(
             read_force(n, name, known) for n, name in zip(force_elements, force_names, strict=True)
         )
         constraint_elements = model.objects("ConstraintSet")
-        constraint_names = _unique_names(constraint_elements, "constraint")
+        constraint_names = _unique_names(constraint_elements)
         read = (
             read_constraint(n, name, places, self.coordinate)
             for n, name in zip(constraint_elements, constraint_names, strict=True)
@@ -167,13 +167,13 @@ class _Reader:
         ]
 
 
-def _unique_names(nodes: list[Node], kind: str) -> list[str]:
-    """Return a name for each element: its own, or one made of it where it is empty or taken."""
+def _unique_names(nodes: list[Node]) -> list[str]:
+    """Return a name for each element: its own, or as in OpenSim its class where it has none."""
     taken = {node.name for node in nodes}
     used: set[str] = set()
     names = []
-    for i, node in enumerate(nodes):
-        name = node.name or f"{kind}_{i + 1}"
+    for node in nodes:
+        name = node.name or node.tag.lower()
         wanted, number = name, 2
         while name in used or (name != node.name and name in taken):
             name = f"{wanted}_{number}"
