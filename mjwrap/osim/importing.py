@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
 
 from mjwrap.files.atomic import PartFile
+from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathSpring
+from mjwrap.osim.description.model import OsimModel
+from mjwrap.osim.reading.model import read_osim
 from mjwrap.osim.report import Report
+from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.muscles import MuscleWriter
+from mjwrap.osim.writing.routes import RouteWriter
+from mjwrap.osim.writing.sampled_poses import sampled_poses
+from mjwrap.osim.writing.sites import SiteWriter
+from mjwrap.osim.writing.skeleton import Skeleton, write_bodies
+from mjwrap.osim.writing.unique_names import UniqueNames
+from mjwrap.osim.writing.wraps import write_wrap
 
 MESH_SUFFIXES = (".obj", ".stl", ".msh", ".png")
 
@@ -50,3 +60,41 @@ class Imported(NamedTuple):
             for part in parts:
                 part.discard()
             raise
+
+
+def import_osim(path: str | os.PathLike[str], *, poses: int = 60) -> Imported:
+    """Import an OpenSim model (.osim) as a MuJoCo model with geodesic muscles.
+
+    Args:
+        path: the file.
+        poses: number of poses within the coordinates' ranges at which the places of wrap objects on their paths are
+            chosen.
+
+    Returns:
+        The model, a report on every element of the file, and the text to write.
+
+    Raises:
+        OsimError: the file is not an OpenSim model, or has an element that cannot be represented; the message names it.
+    """
+    model = read_osim(path)
+    document, report = Document(model.name), Report(model.name, model.version)
+    skeleton = write_bodies(document, model, report)
+    write_paths(document, model, report, skeleton, poses)
+    xml = document.to_xml()
+    spec = mujoco.MjSpec.from_string(xml, assets=document.assets)
+    return Imported(spec, report, xml, document.assets)
+
+
+def write_paths(document: Document, model: OsimModel, report: Report, skeleton: Skeleton, poses: int) -> None:
+    """Write all wrap objects and all forces along paths."""
+    geoms, sites = UniqueNames(document, "geom"), SiteWriter(document, report, skeleton.drivers)
+    pulls = [force for force in model.forces if isinstance(force, Muscle | Ligament | PathSpring | PathActuator)]
+    wraps = {wrap.name: write_wrap(document, report, wrap, geoms, sites) for wrap in model.wraps}
+    written = {name: wrap for name, wrap in wraps.items() if wrap is not None}
+    used = any(pull.path.wraps for pull in pulls)
+    samples = sampled_poses(model, poses) if used else []
+    muscles = MuscleWriter(document, report, RouteWriter(report, sites, written, samples))
+    for pull in pulls:
+        muscles.write(pull)
+    if any(muscles.default_activations):
+        document.add("keyframe", "key", name="default", act=muscles.default_activations)
