@@ -195,9 +195,9 @@ def _motion(node: Node, name: str, axes: Sequence[Axis]) -> str:
         return ROTATIONAL
     motion = COUPLED
     for i, axis in enumerate(axes):
-        if name in axis.coordinates and axis.function.kind == "LinearFunction":
-            if abs(axis.function.coefficients[0, 1]) == 1.0:
-                motion = ROTATIONAL if i < 3 else TRANSLATIONAL
+        linear_in_it = name in axis.coordinates and axis.function.kind == "LinearFunction"
+        if linear_in_it and abs(axis.function.coefficients[0, 1]) == 1.0:
+            motion = ROTATIONAL if i < 3 else TRANSLATIONAL
     return motion
 
 
