@@ -78,8 +78,8 @@ class Joint:
 
     All joints are written so, pin, ball, free and the others too: an axis without motion has a constant function.
     EllipsoidJoint and ScapulothoracicJoint have `radii`: their translation is radii * (z of the turned frame), so that
-    the origin stays on an ellipsoid. The fourth coordinate of a ScapulothoracicJoint then turns the child frame about the
-    axis (-sin, cos, 0)(winging_direction) through (winging_origin, 0), both in the turned frame.
+    the origin stays on an ellipsoid. The fourth coordinate of a ScapulothoracicJoint then turns the child frame about
+    the axis (-sin, cos, 0)(winging_direction) through (winging_origin, 0), both in the turned frame.
     """
 
     name: str

@@ -62,7 +62,7 @@ def read_joint(node: Node, places: Places, names: dict[int, str], name: str) -> 
         known = {element.name: names[id(element)] for element in elements}
         axes = _custom_axes(node, known)
     else:
-        axes, known = _fixed_axes(node, elements, names, name)
+        axes, known = _fixed_axes(node, elements, names)
     coordinates = _coordinates(node, elements, list(known.values()), axes, name)
     radii, origin, direction = None, None, 0.0
     if node.tag == "EllipsoidJoint":
@@ -99,17 +99,13 @@ def _still(index: int) -> Axis:
 
 
 def _fixed_axes(
-    node: Node, elements: Sequence[Node], names: dict[int, str], joint: str
+    node: Node, elements: Sequence[Node], names: dict[int, str]
 ) -> tuple[list[Axis], dict[str, str]]:
     driven = SIMPLE.get(node.tag, ())
     count = 4 if node.tag == SCAPULOTHORACIC else len(driven)
-    if len(elements) > count:
+    if len(elements) != count:
         raise node.error(f"has {len(elements)} coordinates; a {node.tag} has {count}")
     known = {element.name: names[id(element)] for element in elements}
-    for i in range(len(elements), count):
-        known[f"{joint}_coord_{i}"] = f"{joint}_coord_{i}"
-    if len(known) < count:
-        raise node.error("two of its coordinates have the same name")
     axes = [_still(i) for i in range(6)]
     if (
         node.tag == SCAPULOTHORACIC
@@ -169,9 +165,6 @@ def _coordinates(
     result = []
     for i, name in enumerate(names):
         motion = _motion(node, name, axes)
-        if i >= len(elements):
-            result.append(Coordinate(name, joint, motion, 0.0, 0.0, (-10.0, 10.0), False, False))
-            continue
         element = elements[i]
         low, high = element.vector("range", size=2, default=(-10.0, 10.0), finite=False)
         if not low <= high:
@@ -196,15 +189,16 @@ def _coordinates(
 
 
 def _motion(node: Node, name: str, axes: Sequence[Axis]) -> str:
-    """Return whether a coordinate is an angle, a length, or neither as it drives motions by functions of it."""
+    """Return whether a coordinate is an angle, a length, or neither, by OpenSim's rule: the last motion that it drives
+    with a slope of 1 or -1."""
     if node.tag == SCAPULOTHORACIC:
         return ROTATIONAL
+    motion = COUPLED
     for i, axis in enumerate(axes):
-        if name in axis.coordinates:
-            function = axis.function
-            if function.is_linear and function.coefficients[0, 1] == 1.0:
-                return ROTATIONAL if i < 3 else TRANSLATIONAL
-    return COUPLED
+        linear_in_it = name in axis.coordinates and axis.function.kind == "LinearFunction"
+        if linear_in_it and abs(axis.function.coefficients[0, 1]) == 1.0:
+            motion = ROTATIONAL if i < 3 else TRANSLATIONAL
+    return motion
 
 
 def _radii(node: Node, tag: str) -> Array:
