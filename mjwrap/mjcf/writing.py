@@ -22,7 +22,7 @@ from mjwrap.mjcf.parameters import (
 )
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles.activation import ActivationDynamics
-from mjwrap.muscles.laws import FiberLaw
+from mjwrap.muscles.laws import SEVERAL, FiberLaw
 
 OBJ = mujoco.mjtObj
 
@@ -169,7 +169,11 @@ def _write(
 ) -> None:
     """Replace a tuple's parameters by those of a law."""
     given = {key: getattr(law, key, None) for key in (*law.needs, *law.takes)}
-    numerics = {key: [float(value)] for key, value in given.items() if value is not None}
+    numerics = {
+        key: [float(x) for x in (value if key in SEVERAL else [value])]
+        for key, value in given.items()
+        if value is not None
+    }
     texts = {LAW: law.law, TENDON: law.tendon}
     if dynamics is not None:
         up, down, smoothing = dynamics.row()
