@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import mujoco
 
 from mjwrap.errors import ModelError
+from mjwrap.mjcf.active_ranges import WORD as ACTIVE_RANGE
+from mjwrap.mjcf.active_ranges import read_active_range
 from mjwrap.mjcf.actuators import is_fixed, is_muscle, pulled_tendon, unfit_reason
 from mjwrap.mjcf.declarations import MuscleDeclaration, Route
 from mjwrap.mjcf.names import listed, name_of
@@ -117,12 +119,28 @@ def _check_sides(model: mujoco.MjModel, rest: mujoco.MjData, muscle: str, routes
 def _collect(model: mujoco.MjModel, index: int) -> _Elements:
     found = _Elements()
     first = int(model.tuple_adr[index])
-    for j in range(first, first + int(model.tuple_size[index])):
+    end = first + int(model.tuple_size[index])
+    after_site, ranged = False, -1  # whether a range may follow; the numeric of the last range
+    for j in range(first, end):
         kind, item, prm = (
             OBJ(int(model.tuple_objtype[j])),
             int(model.tuple_objid[j]),
             float(model.tuple_objprm[j]),
         )
+        if j == ranged:
+            continue
+        if kind == OBJ.mjOBJ_JOINT:
+            if not after_site:
+                name = name_of(model, kind, item)
+                raise ModelError(
+                    f"joint '{name}' must directly follow a site of the path, whose {ACTIVE_RANGE} it has"
+                )
+            site = found.stops[-1]
+            ranged = j + 1
+            each = read_active_range(model, item, ranged if ranged < end else -1)
+            found.stops[-1] = site._replace(ranges=(*site.ranges, each))
+            continue
+        after_site = kind == OBJ.mjOBJ_SITE and prm == 0.0
         if kind == OBJ.mjOBJ_ACTUATOR:
             found.actuators.append(item)
         elif kind == OBJ.mjOBJ_TENDON:
@@ -142,8 +160,8 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
         else:
             what = kind.name.removeprefix("mjOBJ_").lower()
             raise ModelError(
-                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, or "
-                f"a text whose name contains one of: {listed(TEXTS)}"
+                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, joint, "
+                f"numeric, or a text whose name contains one of: {listed(TEXTS)}"
             )
     _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
     _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)

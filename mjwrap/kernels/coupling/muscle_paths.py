@@ -178,10 +178,10 @@ def _solve_straight(c, routes, poses, paths):
 
 
 @jit
-def solve_routes(routes, poses, paths, tol):
-    """Find path and speed of every route; a route that fails keeps its segments and speed in `paths`."""
+def solve_routes(first, end, routes, poses, paths, tol):
+    """Find path and speed of routes first to end - 1; one that fails keeps its segments and speed in `paths`."""
     node, seg, info, site_xpos = paths.node, paths.segments, paths.info, poses.site_xpos
-    for c in range(routes.rows.shape[0]):
+    for c in range(first, end):
         route = routes.rows[c]
         if route[R_SURFACES] == 0:
             _solve_straight(c, routes, poses, paths)
