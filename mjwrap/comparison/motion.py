@@ -15,6 +15,7 @@ from mjwrap.mjcf import dof_names, name_of
 from mjwrap.model.takeover import Takeover
 from mjwrap.runs.excitation import Excitation
 from mjwrap.system import CableSystem, MuscleSystem
+from mjwrap.system.pieces import PieceSwitch
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -141,7 +142,7 @@ def compare_motion(
     """
     native_model, driven_model = pristine(model), pristine(model)
     muscles = CableSystem(driven_model, side_rule=side_rule)
-    excitation = Excitation(muscles, entries, seed)
+    excitation, pieces = Excitation(muscles, entries, seed), PieceSwitch(native_model)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):
         if key >= 0:
@@ -152,7 +153,7 @@ def compare_motion(
     for _ in range(round(duration / float(model.opt.timestep))):
         excitation.write(native, own=False)
         excitation.write(driven)
-        mujoco.mj_step(native_model, native)
+        pieces.step(native)
         try:
             if unstable(native):
                 stopped = f"MuJoCo's own run became unstable at {times[-1]:g} s"

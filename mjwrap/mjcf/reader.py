@@ -14,6 +14,7 @@ from mjwrap.mjcf.moving_points import is_moving_tuple, read_moving_axes
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.side_rules import choose_side_rule
+from mjwrap.mjcf.tuple_names import declares_muscle
 from mjwrap.mjcf.tuples import read_tuple
 from mjwrap.muscles.laws import ActuatorForce
 
@@ -75,7 +76,7 @@ def _with_moving_sites(muscle: MuscleDeclaration, moving: set[int]) -> MuscleDec
 def _read_tuples(
     model: mujoco.MjModel, rest: mujoco.MjData, by_mujoco: tuple[bool, bool], side_rule: int
 ) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
-    """Return the muscles of all mjwrap tuples: by actuator, and those without one.
+    """Return the muscles of all tuples that declare one: by actuator, and those without one.
 
     by_mujoco: whether MuJoCo computes the forces of its muscles, and of other actuators.
     """
@@ -84,7 +85,7 @@ def _read_tuples(
     free: list[MuscleDeclaration] = []
     for index in range(model.ntuple):
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
-        if "mjwrap" not in tuple_name or is_moving_tuple(tuple_name):
+        if not declares_muscle(tuple_name) or is_moving_tuple(tuple_name):
             continue
         muscle = read_tuple(model, rest, index, by_mujoco, side_rule)
         if muscle.actuator < 0:

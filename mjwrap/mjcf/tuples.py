@@ -26,6 +26,7 @@ from mjwrap.mjcf.parameters import (
 )
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
 from mjwrap.mjcf.side_rules import AUTHORS
+from mjwrap.mjcf.tuple_names import COUPLING
 from mjwrap.mjcf.wrapping_geoms import size_keys
 from mjwrap.surfaces.rows import side_fault
 
@@ -159,9 +160,11 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
             found.texts.append(item)
         else:
             what = kind.name.removeprefix("mjOBJ_").lower()
+            pieces = kind == OBJ.mjOBJ_EQUALITY
+            hint = f"; the pieces of a coupling are in a tuple '{COUPLING}JOINT'" if pieces else ""
             raise ModelError(
                 f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, joint, "
-                f"numeric, or a text whose name contains one of: {listed(TEXTS)}"
+                f"numeric, or a text whose name contains one of: {listed(TEXTS)}{hint}"
             )
     _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
     _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)

@@ -17,6 +17,7 @@ from mjwrap.model.takeover import Takeover
 from mjwrap.muscles.laws import ActuatorForce
 from mjwrap.paths import Status
 from mjwrap.system.checks import check_state, ends_inside
+from mjwrap.system.pieces import PieceSwitch
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
 
@@ -43,6 +44,7 @@ class Evaluator(Results):
         with self._takeover.original_limits():
             found = self._declarations(model, side_rule)
         plan = build_plan(model, found.muscles)
+        self._pieces = PieceSwitch(model)
         super().__init__(found, plan, model, State(model, plan))
         self._takeover.disable(
             [

@@ -78,9 +78,11 @@ class MuscleSystem(Evaluator):
         implicit integrator; under RK4 use `step`, which evaluates the muscles at every stage. Between calls other code
         may add forces to `xfrc_applied` or set the whole array; code that assigns changing forces to single rows should
         use `step`, which does not touch them. The tensions are those for the coming time step (with an elastic tendon:
-        at its end). The states that mjwrap integrates itself do not change: `advance` integrates them.
+        at its end). Couplings of several pieces are switched for that step, in `data.eq_active`. The states that mjwrap
+        integrates itself do not change: `advance` integrates them.
         """
         state = self._state(data)
+        self._pieces.set(data)
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
         state.applied = data.time
         state.failures += state.status != 0
@@ -207,6 +209,7 @@ class MuscleSystem(Evaluator):
             else:
                 for _ in range(nstep):
                     self._check(data)
+                    self._pieces.set(data)
                     mujoco.mj_step1(self.model, data)
                     self._act(state, data, ahead=self.model.opt.timestep)
                     state.failures += state.status != 0
@@ -249,6 +252,7 @@ class MuscleSystem(Evaluator):
             if caught:
                 return
             try:
+                self._pieces.rebuild(data)
                 # a stage is at a multiple of half a step; data.time is rounded
                 self._act(state, data, since=half * round((data.time - start) / half))
                 np.logical_or(failed, state.status != 0, out=failed)
@@ -258,9 +262,11 @@ class MuscleSystem(Evaluator):
             ) as error:  # an exception must not pass through MuJoCo's C code; it is raised below
                 caught.append(error)
 
-        with control_callback(data, act, lambda: self._take_back(state, data)):
+        pieces = self._pieces.stages(data, controlled=True)
+        with pieces, control_callback(data, act, lambda: self._take_back(state, data)):
             for _ in range(nstep):
                 self._check(data)
+                self._pieces.set(data)
                 start = data.time
                 failed[:] = False
                 acted = False

@@ -5,23 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from mjwrap.muscles.millard_curves import PARAMETERS
 from mjwrap.osim.description.forces import Muscle
 
-# Curves of Millard2012: numeric -> class in the file, and its parameters in order.
+# Curves of Millard2012 in the file, by numeric; their parameters and order are those of `millard_curves.PARAMETERS`.
 MILLARD_CURVES = {
-    "active_force_length_curve": ("ActiveForceLengthCurve", (
-        "min_norm_active_fiber_length", "transition_norm_fiber_length", "max_norm_active_fiber_length",
-        "shallow_ascending_slope", "minimum_value")),
-    "force_velocity_curve": ("ForceVelocityCurve", (
-        "concentric_slope_at_vmax", "concentric_slope_near_vmax", "isometric_slope", "eccentric_slope_at_vmax",
-        "eccentric_slope_near_vmax", "max_eccentric_velocity_force_multiplier", "concentric_curviness",
-        "eccentric_curviness")),
-    "fiber_force_length_curve": ("FiberForceLengthCurve", (
-        "strain_at_zero_force", "strain_at_one_norm_force", "stiffness_at_low_force", "stiffness_at_one_norm_force",
-        "curviness")),
-    "tendon_force_length_curve": ("TendonForceLengthCurve", (
-        "strain_at_one_norm_force", "stiffness_at_one_norm_force", "norm_force_at_toe_end", "curviness")),
-}  # fmt: skip
+    "active_force_length_curve": "ActiveForceLengthCurve",
+    "force_velocity_curve": "ForceVelocityCurve",
+    "fiber_force_length_curve": "FiberForceLengthCurve",
+    "tendon_force_length_curve": "TendonForceLengthCurve",
+}
 HILL = {  # numeric -> the file's parameter, of every class with fibre and tendon
     "max_isometric_force": "max_isometric_force",
     "optimal_fiber_length": "optimal_fiber_length",
@@ -30,15 +23,15 @@ HILL = {  # numeric -> the file's parameter, of every class with fibre and tendo
     "max_contraction_velocity": "max_contraction_velocity",
 }
 THELEN = {
-    "tendon_strain": "FmaxTendonStrain",
-    "passive_strain": "FmaxMuscleStrain",
+    "max_tendon_strain": "FmaxTendonStrain",
+    "max_fiber_strain": "FmaxMuscleStrain",
     "active_shape": "KshapeActive",
     "passive_shape": "KshapePassive",
     "velocity_shape": "Af",
-    "lengthening_force": "Flen",
+    "max_lengthening_force": "Flen",
     "velocity_extrapolation": "fv_linear_extrap_threshold",
 }
-MINIMUM, MOST_PENNATION = "minimum_activation", "max_pennation_angle"
+MINIMUM, MOST_PENNATION = "minimum_activation", "max_pennation"
 ACTIVATION = ("activation_time_constant", "deactivation_time_constant")
 AT_ONCE = 1e-9  # [s] time constants of a muscle whose file ignores activation dynamics
 THELEN_CLASSES = ("Thelen2003Muscle", "Thelen2003Muscle_Deprecated")
@@ -71,7 +64,7 @@ def law_of(muscle: Muscle) -> WrittenLaw:
     elif muscle.kind == "DeGrooteFregly2016Muscle":
         _degroote(law, given)
     elif muscle.kind.startswith("Schutte1993"):
-        law.name = "schutte_1993"
+        law.remarks.append(f"{muscle.kind} has the curves and dynamics of Millard2012EquilibriumMuscle")
         _take(law, {"fiber_damping": "damping"}, given)
     else:
         law.remarks.append(f"{muscle.kind} is not known: it has the curves of Millard2012EquilibriumMuscle")
@@ -89,10 +82,10 @@ def _take(law: WrittenLaw, names: Mapping[str, str], given: Mapping[str, float])
 def _millard(law: WrittenLaw, muscle: Muscle) -> None:
     names = {MINIMUM: MINIMUM, MOST_PENNATION: "maximum_pennation_angle", "fiber_damping": "fiber_damping"}
     _take(law, names, muscle.parameters)
-    for numeric, (kind, parameters) in MILLARD_CURVES.items():
+    for numeric, kind in MILLARD_CURVES.items():
         curve = muscle.curves.get(kind, {})
-        if all(name in curve for name in parameters):
-            law.numbers[numeric] = [float(curve[name]) for name in parameters]
+        if all(name in curve for name in PARAMETERS[numeric]):
+            law.numbers[numeric] = [float(curve[name]) for name in PARAMETERS[numeric]]
     if muscle.kind == "Millard2012AccelerationMuscle":
         law.remarks.append("the fibre has no mass: it is that of Millard2012EquilibriumMuscle")
 

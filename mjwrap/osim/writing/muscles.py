@@ -56,7 +56,7 @@ class MuscleWriter:
             case Ligament():
                 law = WrittenLaw("ligament", {
                     "resting_length": [pull.resting_length], "pcsa_force": [pull.pcsa_force],
-                    "force_length_curve": flattened(pull.curve)}, own_states=False)  # fmt: skip
+                    "ligament_curve": flattened(pull.curve)}, own_states=False)  # fmt: skip
                 self._passive(pull.name, route, law)
             case PathSpring():
                 law = WrittenLaw("path_spring", {
@@ -109,6 +109,10 @@ def _fault(pull: Pull) -> str:
             value = pull.parameters.get(key, 0.0)
             if not (math.isfinite(value) and value > 0.0):
                 return f"its {key} is {value:g}"
+    if isinstance(pull, PathSpring) and not pull.stiffness > 0.0:
+        return f"its stiffness is {pull.stiffness:g}"
+    if isinstance(pull, Ligament) and not (pull.pcsa_force > 0.0 and pull.resting_length > 0.0):
+        return f"its pcsa_force is {pull.pcsa_force:g} and its resting_length {pull.resting_length:g}"
     if isinstance(pull, PathActuator) and not pull.optimal_force > 0.0:
         return f"its optimal_force is {pull.optimal_force:g}"
     return ""

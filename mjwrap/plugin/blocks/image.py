@@ -19,6 +19,7 @@ from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.blocks.model_changes import Watch, watch
 from mjwrap.plugin.blocks.points_part import points_part
+from mjwrap.plugin.blocks.pieces_part import pieces_part
 from mjwrap.plugin.blocks.published_part import published_part
 from mjwrap.plugin.blocks.transmission_part import transmission_part
 from mjwrap.plugin.callbacks import block as bk
@@ -84,6 +85,7 @@ def _arrays(
         "transmission": transmission_part(model, plan, muscles),
         "published": published_part(model, plan, muscles, left_out),
         "points": points_part(model, plan.points),
+        "pieces": pieces_part(model),
         "tendon": np.array([m.tendon for m in muscles], dtype=np.int64),
         "actuator": np.array([m.actuator for m in muscles], dtype=np.int64),
         "labels": np.array([m.name.encode()[: dr.LABEL - 1] for m in muscles], dtype=f"S{dr.LABEL}"),
@@ -145,7 +147,7 @@ def block_image(
 _CONSTANT = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
     "weights", "params", "ctrl_low", "ctrl_high", "times", "node", "bound", "drives", "transmission",
-    "published", "points", "tendon", "actuator", "labels",
+    "published", "points", "pieces", "tendon", "actuator", "labels",
 )  # fmt: skip
 
 

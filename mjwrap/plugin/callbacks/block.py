@@ -40,6 +40,7 @@ ARRAYS = (
     "points",
     "tendon", "actuator", "labels", "blank",
     "plain", "plain_seen", "derived", "derived_seen", "structure", "structure_seen", "bound", "drives", "pointers",
+    "pieces",
 )  # fmt: skip
 (
     A_ROUTES, A_LINKS, A_LAW, A_SOURCE, A_INDEX, A_CONTROL, A_FORM, A_GROUP, A_BODY_ROOTID, A_LOADED,
@@ -50,6 +51,7 @@ ARRAYS = (
     A_POINTS,
     A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
     A_PLAIN, A_PLAIN_SEEN, A_DERIVED, A_DERIVED_SEEN, A_STRUCTURE, A_STRUCTURE_SEEN, A_BOUND, A_DRIVES, A_POINTERS,
+    A_PIECES,
 ) = range(48, 48 + len(ARRAYS))  # fmt: skip
 # for drawing: byte offsets in MuJoCo's structs (for an option: of its byte), the size of an mjvGeom, MuJoCo's codes,
 # the addresses of a function that warns and of its message

@@ -25,6 +25,7 @@ from mjwrap.plugin.callbacks.groups import (
 )
 from mjwrap.plugin.callbacks.memory import bool_array, float64_array, read_float64, read_int32, read_int64
 from mjwrap.plugin.callbacks.path_points import GIVEN, add_joint_forces, frames_of, points_of
+from mjwrap.plugin.callbacks.pieces import update_pieces
 from mjwrap.plugin.callbacks.publishing import COUNT, publish_lengths
 from mjwrap.plugin.callbacks.saving import floats, ints, load, load_held, save, sizes, state_of
 from mjwrap.plugin.callbacks.sync import sync_with_model
@@ -111,7 +112,11 @@ def _time_since_start(time, step, ended, clock):
 
 
 def stage(block, model, data):
-    """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions."""
+    """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions.
+
+    The pieces of couplings of joints are switched before.
+    """
+    update_pieces(block + read_int64(block + 8 * bk.A_PIECES), model, data)
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
