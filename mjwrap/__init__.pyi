@@ -40,9 +40,12 @@ from .mjcf import muscle_xml as muscle_xml
 from .mjcf import set_laws as set_laws
 from .muscles import ActivationDynamics as ActivationDynamics
 from .muscles import DeGrooteFregly2016 as DeGrooteFregly2016
+from .muscles import Ligament as Ligament
 from .muscles import Millard2012 as Millard2012
 from .muscles import MuJoCoMuscle as MuJoCoMuscle
 from .muscles import PathActuator as PathActuator
+from .muscles import PathSpring as PathSpring
+from .muscles import Thelen2003 as Thelen2003
 from .muscles.bench import MuscleTrial as MuscleTrial
 from .muscles.bench import simulate_muscle as simulate_muscle
 from .muscles.energetics import Energetics as Energetics

@@ -17,14 +17,24 @@ from mjwrap.kernels.musculotendon.bezier import (
     DX,
     DY,
     FIRST,
+    LAST_STEP,
     MIDDLE,
+    NODES,
+    ROUNDING,
     S0,
     S1,
     SCALE,
+    WEIGHTS,
     X0,
+    XQ,
+    XR,
     Y0,
+    YQ,
+    YR,
+    blend,
+    invert,
 )
-from mjwrap.kernels.musculotendon.curve_memory import read, rows
+from mjwrap.kernels.musculotendon.curve_memory import read
 
 CELLS = 256
 STARTS = 65
@@ -83,31 +93,70 @@ def evaluate(address, x):
 
 @jit
 def corners_of(address):
-    """Return the corners of a curve (n, 10)."""
-    count = int(read(address, CORNERS))
+    """Return the address of the first corner of a curve, and the number of its corners."""
     before = HEAD + CELLS + WIDTH * int(read(address, PIECES))
-    return rows(address + 8 * before, (count, CORNER))
+    return address + 8 * before, int(read(address, CORNERS))
 
 
 @jit
 def near_inverse(address, y):
     """Return about the x at which a rising curve that starts at 0 has the value y, to start an iteration with."""
-    places = HEAD + CELLS + WIDTH * int(read(address, PIECES)) + CORNER * int(read(address, CORNERS))
+    corner, count = corners_of(address)
+    starts = corner + 8 * CORNER * count
     share = min(max(y / read(address, GREATEST), 0.0), 1.0) * (STARTS - 1)
     k = min(int(share), STARTS - 2)
-    x = read(address, places + k)
-    return x + (share - k) * (read(address, places + k + 1) - x)
+    x = read(starts, k)
+    return x + (share - k) * (read(starts, k + 1) - x)
 
 
 @jit
 def inverse(address, y):
     """Return x at which a rising curve has the value y, also on its end tangents; the nearer end where they are flat."""
-    corners = corners_of(address)
-    last = corners.shape[0] - 1
-    low, high = corners[0, Y0], corners[last, Y0] + corners[last, DY]
-    x = bezier.inverse(corners, y)
-    if y < low and corners[0, S0] > 0.0:
-        x = corners[0, X0] + (y - low) / corners[0, S0]
-    if y > high and corners[last, S1] > 0.0:
-        x = corners[last, X0] + corners[last, DX] + (y - high) / corners[last, S1]
-    return x
+    corner, count = corners_of(address)
+    low = read(corner, Y0)
+    if y <= low:
+        slope = read(corner, S0)
+        return read(corner, X0) + ((y - low) / slope if slope > 0.0 else 0.0)
+    for _ in range(count):
+        rest = y - read(corner, Y0)
+        if rest < read(corner, DY):
+            u = invert(read(corner, YQ), read(corner, YR), rest / read(corner, DY), 0.5, ROUNDING)
+            x, _ = blend(read(corner, XQ), read(corner, XR), u)
+            return read(corner, X0) + read(corner, DX) * x
+        corner += 8 * CORNER
+    corner -= 8 * CORNER
+    rest = y - read(corner, Y0) - read(corner, DY)
+    slope = read(corner, S1)
+    return read(corner, X0) + read(corner, DX) + (rest / slope if slope > 0.0 else 0.0)
+
+
+@jit
+def _corner_integral(corner, u):
+    """Return the integral of y dx over a corner from its start to its parameter u."""
+    total = 0.0
+    for k in range(NODES.shape[0]):
+        s = 0.5 * u * (1.0 + NODES[k])
+        y, _ = blend(read(corner, YQ), read(corner, YR), s)
+        _, across = blend(read(corner, XQ), read(corner, XR), s)
+        total += WEIGHTS[k] * (read(corner, Y0) + read(corner, DY) * y) * across
+    return 0.5 * u * read(corner, DX) * total
+
+
+@jit
+def integral(address, x):
+    """Return the integral of a curve from the start of its first corner to x, exact up to rounding; as in `bezier.py`."""
+    corner, count = corners_of(address)
+    past = x - read(corner, X0)
+    if past <= 0.0:
+        return past * (read(corner, Y0) + 0.5 * read(corner, S0) * past)
+    total = 0.0
+    for _ in range(count):
+        wanted = (x - read(corner, X0)) / read(corner, DX)
+        if wanted < 1.0:
+            u = invert(read(corner, XQ), read(corner, XR), wanted, wanted, LAST_STEP)
+            return total + _corner_integral(corner, u)
+        total += _corner_integral(corner, 1.0)
+        corner += 8 * CORNER
+    corner -= 8 * CORNER
+    past = x - read(corner, X0) - read(corner, DX)
+    return total + past * (read(corner, Y0) + read(corner, DY) + 0.5 * read(corner, S1) * past)

@@ -225,7 +225,7 @@ def _lowest(law, activation, height, ratio, unit_length, low, high):
     count = 0
     while count < MAX_EVALUATIONS and high - low > 1e-12:
         middle = 0.5 * (low + high)
-        off, slope = rest_imbalance(curves, activation, height, ratio, unit_length, middle)
+        off, slope = rest_imbalance(law, activation, height, ratio, unit_length, middle)
         count += 1
         if off <= 0.0:
             break

@@ -8,8 +8,8 @@ Each function here is that of the same name in `dispatch.py`.
 from __future__ import annotations
 
 from mjwrap.kernels.compilation.jit import jit, no_inline
-from mjwrap.kernels.musculotendon import bezier, bezier_tables, thelen
-from mjwrap.kernels.musculotendon.bezier_tables import corners_of, evaluate
+from mjwrap.kernels.musculotendon import bezier_tables, thelen
+from mjwrap.kernels.musculotendon.bezier_tables import evaluate
 from mjwrap.kernels.musculotendon.curve_memory import read
 
 KIND, LONGEST_START = 0, 1
@@ -108,7 +108,7 @@ def passive_energy(h, x):
     """Return the energy of the parallel elastic element [F_max l_o] at fibre length x [l_o]."""
     if read(h, KIND) == THELEN:
         return thelen.passive_energy(h, x)
-    return bezier.integral(corners_of(int(read(h, PASSIVE))), x)
+    return bezier_tables.integral(int(read(h, PASSIVE)), x)
 
 
 @jit
@@ -116,4 +116,4 @@ def tendon_energy(h, x):
     """Return the energy of the tendon [F_max l_s] at its length x [l_s], above one."""
     if read(h, KIND) == THELEN:
         return thelen.tendon_energy(h, x)
-    return bezier.integral(corners_of(int(read(h, TENDON))), x)
+    return bezier_tables.integral(int(read(h, TENDON)), x)
