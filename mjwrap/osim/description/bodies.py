@@ -61,6 +61,7 @@ class Coordinate:
     clamped: bool
     locked: bool
     prescribed: Piecewise | None = None  # a function of time that is switched on
+    free_to_satisfy_constraints: bool = False  # its default does not count when constraints are assembled
 
 
 @dataclass(frozen=True)

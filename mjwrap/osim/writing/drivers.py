@@ -87,7 +87,7 @@ def drivers_of(model: OsimModel, branches: list[Branch]) -> Drivers:
                     f"{branch.joint.kind} '{branch.joint.name}': coordinate '{step.coordinate}' of {step.name} not found; "
                     f"coordinates: {', '.join(coordinates)}"
                 )
-            if step.main and _shows(step):
+            if _shows(step):
                 known = carriers.get(step.coordinate)
                 fits = step.turn == (coordinates[step.coordinate].motion == "rotational")
                 if known is None or (fits and not _fits(known, coordinates)):
@@ -106,7 +106,7 @@ def default_of(coordinate: Coordinate) -> float:
 
 def _shows(motion: Motion) -> bool:
     """Whether a motion goes with its coordinate, one to one, in one direction or the other."""
-    return motion.function.is_linear and abs(float(motion.function(0.0, 1))) == 1.0
+    return motion.main and motion.function.is_linear and abs(float(motion.function(0.0, 1))) == 1.0
 
 
 def _fits(motion: Motion, coordinates: dict[str, Coordinate]) -> bool:

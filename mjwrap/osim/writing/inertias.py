@@ -93,8 +93,8 @@ def written_inertias(bodies: tuple[Body, ...], branches: list[Branch]) -> dict[s
     by_name = {body.name: body for body in bodies}
     own: dict[str, MassProperties] = {}
     for branch in branches:
-        body = by_name[branch.copy_of or branch.body]
-        if branch.copy_of and branch.fixed:
+        body = by_name.get(branch.copy_of or branch.body)
+        if body is None or branch.copy_of and branch.fixed:
             own[branch.body] = EMPTY
         else:
             whole = MassProperties(body.mass, body.mass_center, body.inertia)

@@ -16,6 +16,9 @@ ROTATION_NAMES = ("rotation1", "rotation2", "rotation3")
 TRANSLATION_NAMES = ("translation1", "translation2", "translation3")
 
 
+Values = Callable[[str], float]  # the value of a coordinate by its name
+
+
 @dataclass(frozen=True)
 class Motion:
     """A turn about, or a slide along, a unit axis (3,) by function(coordinate) [rad or m].
@@ -29,6 +32,10 @@ class Motion:
     function: Piecewise
     name: str
     main: bool = True
+
+    def value(self, values: Values) -> float:
+        """Return how far it has moved at values of the coordinates."""
+        return float(self.function(values(self.coordinate)))
 
     def transform(self, value: float) -> Array:
         """Return the motion (4, 4) when its function has a value."""
@@ -79,12 +86,12 @@ def inverted(chain: Chain) -> Chain:
     return [step.reversed() if isinstance(step, Motion) else inverse(step) for step in reversed(chain)]
 
 
-def evaluated(chain: Chain, values: Callable[[str], float]) -> Array:
+def evaluated(chain: Chain, values: Values) -> Array:
     """Return the transform (4, 4) of a chain at values of the coordinates."""
     out = np.eye(4)
     for step in chain:
         if isinstance(step, Motion):
-            out = out @ step.transform(float(step.function(values(step.coordinate))))
+            out = out @ step.transform(step.value(values))
         else:
             out = out @ step
     return out

@@ -10,9 +10,11 @@ from mjwrap.osim.description.bodies import Coordinate
 from mjwrap.osim.description.functions import Array, Piecewise, linear
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
-from mjwrap.osim.writing.couplings import write_coupling, write_hold
+from mjwrap.osim.writing.assembly import assemble
+from mjwrap.osim.writing.couplings import write_coupling
 from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.drivers import Drivers, drivers_of
+from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
 from mjwrap.osim.writing.inertias import Written, written_inertias
 from mjwrap.osim.writing.motions import Motion, evaluated
 from mjwrap.osim.writing.piece_algebra import composed
@@ -27,6 +29,14 @@ class Skeleton:
     branches: list[Branch]
     drivers: Drivers
     inertias: dict[str, Written]
+    joints: list[tuple[str, Motion]]  # the name and the motion of every joint of a body
+
+    def qpos(self, values: dict[str, float]) -> dict[str, float]:
+        """Return qpos of every joint of a body at values of all coordinates, exactly, without pieces."""
+        return {
+            name: values[name] if name in values else motion.value(values.__getitem__)
+            for name, motion in self.joints
+        }
 
 
 class _Writer:
@@ -35,6 +45,7 @@ class _Writer:
         self.taken = set(drivers.coordinates)
         self.followers: list[tuple[str, float, str, Piecewise]] = []  # joint, reference, coordinate, function
         self.shown: set[str] = set()
+        self.joints: list[tuple[str, Motion]] = []
 
     def name(self, wanted: str) -> str:
         name = "_".join(wanted.split())
@@ -56,7 +67,7 @@ class _Writer:
         for step in reversed(branch.chain):
             if isinstance(step, Motion):
                 joints.append(self.joint(branch, step, after))
-                after = step.transform(float(step.function(values(step.coordinate)))) @ after
+                after = step.transform(step.value(values)) @ after
             else:
                 after = step @ after
         for attributes in reversed(joints):
@@ -73,17 +84,18 @@ class _Writer:
         attributes: dict[str, object] = {"type": "hinge" if motion.turn else "slide"}
         if motion.turn:
             attributes["pos"] = -after[:3, :3].T @ after[:3, 3]
-        value = drivers.value(coordinate)
         if drivers.carriers.get(coordinate) is motion:
             name = coordinate
             self.shown.add(coordinate)
             axis = axis * float(motion.function(0.0, 1))
-            reference = value
+            reference = drivers.value(coordinate)
             attributes.update(self.limits(drivers.coordinates[coordinate]))
         else:
             name = self.name(f"{branch.joint.name}_{motion.name}")
-            reference = float(motion.function(value))
-            self.followers.append((name, reference, coordinate, motion.function))
+            reference = motion.value(drivers.value)
+            if not isinstance(motion, EllipsoidSlide):
+                self.followers.append((name, reference, coordinate, motion.function))
+        self.joints.append((name, motion))
         return {"name": name, **attributes, "axis": axis, "ref": reference}
 
     def limits(self, coordinate: Coordinate) -> dict[str, object]:
@@ -137,6 +149,7 @@ def write_bodies(document: Document, model: OsimModel, report: Report) -> Skelet
     """Write bodies, joints, coordinates and couplers; return what later parts need to know of them."""
     branches = branches_of(model)
     drivers = drivers_of(model, branches)
+    assemble(model, branches, drivers)
     inertias = written_inertias(model.bodies, branches)
     writer = _Writer(document, report, drivers)
     for branch in branches:
@@ -151,4 +164,4 @@ def write_bodies(document: Document, model: OsimModel, report: Report) -> Skelet
             drivers.carriers.setdefault(name, Motion(True, np.array([1.0, 0.0, 0.0]), name, linear(1.0), ""))
             writer.shown.add(name)
     writer.couplings()
-    return Skeleton(branches, drivers, inertias)
+    return Skeleton(branches, drivers, inertias, writer.joints)

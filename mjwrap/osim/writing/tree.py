@@ -10,15 +10,39 @@ from mjwrap.errors import OsimError
 from mjwrap.osim.description.bodies import GROUND, Axis, Coordinate, Frame, Joint
 from mjwrap.osim.description.functions import linear
 from mjwrap.osim.description.model import OsimModel
-from mjwrap.osim.writing.ellipsoids import ellipsoid_chain
-from mjwrap.osim.writing.motions import Chain, Motion, inverse, inverted, merged, placed, spatial_chain
+from mjwrap.osim.writing.ellipsoids import ellipsoid_of
+from mjwrap.osim.writing.motions import (
+    Array,
+    Chain,
+    Motion,
+    inverse,
+    inverted,
+    merged,
+    moved,
+    placed,
+    spatial_chain,
+)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A point of one body that stays in a plane of another: through the origin of `frame` (4, 4), normal to `axis` (3,) in it.
+
+    place: the transform (4, 4) of a frame of the second body, `mover`, whose origin is the point.
+    """
+
+    body: str
+    frame: Array
+    axis: Array
+    mover: str
+    place: Array
 
 
 @dataclass(frozen=True)
 class Branch:
     """A body with the joint that carries it; `chain` is its motion in its parent, another body or ground.
 
-    copy_of: the body that this one is part of, where the joint closes a loop; empty otherwise. backward: whether the joint's
+    The body may be a frame between two bodies of the file that needs a body of its own. copy_of: the body that this one is part of, where the joint closes a loop; empty otherwise. backward: whether the joint's
     child is the parent here.
     """
 
@@ -28,6 +52,7 @@ class Branch:
     chain: Chain
     copy_of: str = ""
     backward: bool = False
+    planes: tuple[Plane, ...] = ()
 
     @property
     def fixed(self) -> bool:
@@ -50,6 +75,7 @@ def branches_of(model: OsimModel) -> list[Branch]:
         if joint.parent.body == joint.child.body:
             raise OsimError(f"{joint.kind} '{joint.name}' joins body '{joint.parent.body}' to itself")
     reached = {GROUND}
+    taken = {GROUND, *names}
     waiting = list(model.joints)
     branches: list[Branch] = []
     while True:
@@ -68,14 +94,10 @@ def branches_of(model: OsimModel) -> list[Branch]:
         if backward:
             parent, body = body, parent
         reached.add(body)
-        branches.append(Branch(body, parent, joint, chain_of(joint, backward), backward=backward))
-    taken = set(reached)
+        branches += _branches_across(joint, body, parent, taken, backward=backward)
     for joint in waiting:
-        name = f"{joint.child.body}_{joint.name}"
-        while name in taken:
-            name += "_"
-        taken.add(name)
-        branches.append(Branch(name, joint.parent.body, joint, chain_of(joint, False), joint.child.body))
+        name = unused(f"{joint.child.body}_{joint.name}", taken)
+        branches += _branches_across(joint, name, joint.parent.body, taken, copy_of=joint.child.body)
     return branches
 
 
@@ -90,11 +112,44 @@ def _next(waiting: list[Joint], reached: set[str]) -> tuple[Joint, bool] | None:
     return None
 
 
-def chain_of(joint: Joint, backward: bool) -> Chain:
-    """Return the motion of a joint's child body in its parent body, or the other way round."""
-    across = spatial_chain(joint) if joint.radii is None else ellipsoid_chain(joint)
-    chain = merged([placed(joint.parent), *across, inverse(placed(joint.child))])
-    return inverted(chain) if backward else chain
+def _branches_across(
+    joint: Joint, body: str, parent: str, taken: set[str], *, backward: bool = False, copy_of: str = ""
+) -> list[Branch]:
+    """Return the branches of a joint: one, or two where a frame between its two bodies needs a body of its own."""
+    start, end = placed(joint.parent), inverse(placed(joint.child))
+    if joint.radii is None:
+        chain = merged([start, *spatial_chain(joint), end])
+        return [Branch(body, parent, joint, inverted(chain) if backward else chain, copy_of, backward)]
+    if backward:
+        raise OsimError(
+            f"{joint.kind} '{joint.name}': only its child body '{parent}' is joined to ground by other joints; "
+            f"swap its parent and child frames"
+        )
+    across = ellipsoid_of(joint)
+    onto = [start @ across.before, *across.onto]
+    if not across.after:
+        planes = tuple(
+            Plane(parent, start @ across.before, axis, body, inverse(end) @ moved(np.array([0.0, 0.0, place])))
+            for place, axis in across.planes
+        )
+        return [Branch(body, parent, joint, merged([*onto, end]), copy_of, planes=planes)]
+    middle = unused(f"{body}_{joint.name}_frame", taken)
+    planes = tuple(
+        Plane(parent, start @ across.before, axis, middle, moved(np.array([0.0, 0.0, place])))
+        for place, axis in across.planes
+    )
+    return [
+        Branch(middle, parent, joint, merged(onto), planes=planes),
+        Branch(body, middle, joint, merged([*across.after, end]), copy_of),
+    ]
+
+
+def unused(name: str, taken: set[str]) -> str:
+    """Return a name that is not taken, and take it."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
 
 
 def _free_joint(body: str, taken: set[str]) -> Joint:
