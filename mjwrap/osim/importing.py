@@ -12,8 +12,10 @@ from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathS
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.reading.model import read_osim
 from mjwrap.osim.report import Report
+from mjwrap.osim.writing.constraints import write_constraints
 from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.muscles import MuscleWriter
+from mjwrap.osim.writing.options import write_options
 from mjwrap.osim.writing.routes import RouteWriter
 from mjwrap.osim.writing.sampled_poses import sampled_poses
 from mjwrap.osim.writing.sites import SiteWriter
@@ -78,7 +80,9 @@ def import_osim(path: str | os.PathLike[str], *, poses: int = 60) -> Imported:
     """
     model = read_osim(path)
     document, report = Document(model.name), Report(model.name, model.version)
+    write_options(document, model)
     skeleton = write_bodies(document, model, report)
+    write_constraints(document, model, report, skeleton)
     write_paths(document, model, report, skeleton, poses)
     xml = document.to_xml()
     spec = mujoco.MjSpec.from_string(xml, assets=document.assets)
