@@ -78,6 +78,11 @@ def pieces_xml(
     return equalities, f'{knots}<tuple name="mjwrap_coupling_{follower}">{elements}{listed}</tuple>'
 
 
+# A floor for contacts, and a box that comes to rest on it.
+FLOOR = """
+    <geom name="floor" type="plane" size="3 3 .1" pos="0 0 .17"/>
+    <body name="box" pos="1 1 .2"><freejoint/><geom type="box" size=".1 .1 .03" mass="1"/></body>
+"""
 # A thigh and a shank that slides and turns with the knee's angle, as in gait10; a patella that follows by two steps;
 # a wheel that follows a sum of two hinges.
 KNEE = """
@@ -102,7 +107,7 @@ KNEE = """
     </body>
     <body name="wheel" pos="0 .5 1"><joint name="wheel" axis="0 1 0" ref="{wheel}"/>
       <geom type="capsule" size=".02" fromto="0 0 0 .1 0 0" mass=".5"/></body>
-  </worldbody>
+  {floor}</worldbody>
   <tendon>
     <fixed name="wheel_only"><joint joint="wheel" coef="1"/></fixed>
     <fixed name="hip_and_ankle"><joint joint="hip" coef=".7"/><joint joint="ankle" coef="-.4"/></fixed>
@@ -154,7 +159,9 @@ def knee(
     timestep: float = 1e-3,
     integrator: str = "RK4",
     muscle: bool = False,
-    counts: tuple[int, ...] = (4, 6, 3, 5, 7),
+    floor: bool = False,
+    wheel: bool = True,
+    counts: tuple[int, ...] = (9, 12, 7, 8, 10),
     size: float = 0.02,
 ) -> Knee:
     """Return a random knee: slides and a twist of the knee's angle, the patella of a slide, the wheel of a sum."""
@@ -177,12 +184,16 @@ def knee(
         pieces_xml(n, "knee", splines[n], rest, timestep=timestep) for n in ("slide_x", "slide_z", "twist")
     ]
     parts.append(pieces_xml("glide", "slide_z", splines["glide"], refs["slide_z"], timestep=timestep))
-    parts.append(
-        pieces_xml("wheel_only", "hip_and_ankle", splines["wheel"], 0.0, "tendon", timestep=timestep)
+    if not wheel:
+        del splines["wheel"], leaders["wheel"]
+    parts += (
+        []
+        if not wheel
+        else [pieces_xml("wheel_only", "hip_and_ankle", splines["wheel"], 0.0, "tendon", timestep=timestep)]
     )
     tendon, actuator = MUSCLE if muscle else ("", "")
     xml = KNEE.format(
-        timestep=timestep, integrator=integrator, tendon=tendon, actuator=actuator,
+        timestep=timestep, integrator=integrator, tendon=tendon, actuator=actuator, floor=FLOOR * floor,
         x=refs["slide_x"], z=refs["slide_z"], knee=rest, twist=refs["twist"], glide=refs["glide"], wheel=refs["wheel"],
         equalities="".join(part[0] for part in parts), custom="".join(part[1] for part in parts),
     )  # fmt: skip

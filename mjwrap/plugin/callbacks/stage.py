@@ -114,9 +114,8 @@ def _time_since_start(time, step, ended, clock):
 def stage(block, model, data):
     """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions.
 
-    The pieces of couplings of joints are switched before.
+    The pieces of couplings of joints are switched, too.
     """
-    update_pieces(block + read_int64(block + 8 * bk.A_PIECES), model, data)
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
@@ -129,7 +128,9 @@ def stage(block, model, data):
     at_points = block + read_int64(block + 8 * bk.A_POINTS)
     has_points = read_int64(at_points + 8 * GIVEN) != 0
     points, frames = points_of(at_points, block), frames_of(at_points, block, model, data)
+    pieces = block + read_int64(block + 8 * bk.A_PIECES)
     if idle and not transmits:
+        update_pieces(pieces, model, data)
         if has_points:
             place_sites(points, frames, poses_of(block, data).site_xpos)
         clock[bk.ACTED] = 0.0
@@ -144,6 +145,7 @@ def stage(block, model, data):
     if since == 0.0:
         sync_with_model(block, model)
         load(block, state)
+    update_pieces(pieces, model, data)
     off, group = bool_array(block + read_int64(block + 8 * bk.A_OFF), (n,)), ints(block, bk.A_GROUP, (n,))
     switched = read_int32(model + read_int64(block + 8 * bk.DISABLEACTUATOR))
     for m in range(n):
