@@ -16,7 +16,7 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import segment_clearance, segment_winding_angle, winding_angle
 from mjwrap.kernels.geometry.projection import turn_into_frame
-from mjwrap.kernels.geometry.traits import branched, closed_form, sided
+from mjwrap.kernels.geometry.traits import branched, closed_form, one_sided, sided
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import next_contact_point
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
@@ -142,15 +142,18 @@ def _is_met(k, lo, hi, ends, node):
 
 
 @jit
-def _mark_span(lo, hi, ends, node, only_sided):
+def _mark_span(lo, hi, ends, node, searched, only_sided):
     """Write to the flags HINT which hints the path over lo..hi does not meet; return how many.
 
-    only_sided: a hint that only picks a start counts as met.
+    searched: a side that no search can reach counts as met. only_sided: a hint that only picks a start does.
     """
     count = 0
     for k in range(lo, hi):
         if node[k, HINT] > 0.0 and node[k, lay.INSIDE] == 0.0:
-            met = (only_sided and not sided(k, node)) or _is_met(k, lo, hi, ends, node)
+            met = only_sided and not sided(k, node)
+            # a sphere's wrap is the only one: no search can bring it to its side
+            met = met or (searched and sided(k, node) and one_sided(k, node))
+            met = met or _is_met(k, lo, hi, ends, node)
             node[k, HINT] = 1.0 if met else UNMET_HINT
             count += 0 if met else 1
     return count
@@ -193,7 +196,7 @@ def mark_unmet_hints(lo, hi, ox, oy, oz, ix, iy, iz, node):
         bx, by, bz = ix - ox, iy - oy, iz - oz
         if k < hi:
             bx, by, bz = node[k, POS] - ox, node[k, POS + 1] - oy, node[k, POS + 2] - oz
-        count += _mark_span(start, k, (ox, oy, oz, ax, ay, az, bx, by, bz), node, False)
+        count += _mark_span(start, k, (ox, oy, oz, ax, ay, az, bx, by, bz), node, False, False)
         ax, ay, az = bx, by, bz
         start = k + 1
     return count
@@ -207,7 +210,7 @@ def meet_hints(lo, hi, ends, node, tol, length, error, only_sided):
     after a warm start, where only sides that hold at every pose ask for anything.
     """
     iterations, evaluations = 0, 0
-    unmet = _mark_span(lo, hi, ends, node, only_sided)
+    unmet = _mark_span(lo, hi, ends, node, True, only_sided)
     least, last, result, is_best = unmet, length, lay.CONVERGED, True
     save_solutions(lo, hi, node, W_BEST)
     for attempt in range(ATTEMPTS):
@@ -218,7 +221,7 @@ def meet_hints(lo, hi, ends, node, tol, length, error, only_sided):
         iterations += i
         evaluations += e
         before = unmet
-        unmet = _mark_span(lo, hi, ends, node, only_sided)
+        unmet = _mark_span(lo, hi, ends, node, True, only_sided)
         same = attempt > 0 and unmet == before and abs(total - last) <= SAME * total
         last = total
         # a path that meets all hints counts also where it leaves the range of a surface

@@ -113,9 +113,9 @@ def _hinted(k, node):
 def _sweep(k, node, ax, ay, bx, by, a, b):
     """Return the angle that the string sweeps about the axis, on the saved branch, else the shorter way [rad].
 
-    The points are divided by (a, b). A side that holds at every pose decides alone.
+    The points are divided by (a, b). At a cold start a side that holds at every pose decides.
     """
-    if sided(k, node):
+    if node[k, S_MODE] == lay.COLD and sided(k, node):
         return side_sweep(k, node, ax, ay, bx, by, a, b)
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     return sweep if node[k, S_MODE] == lay.COLD else unwrap_angle(sweep, node[k, S_SWEEP])

@@ -92,11 +92,18 @@ def any_sided(lo, hi, node):
 
 
 @jit
-def forget_sided(lo, hi, node):
-    """Make rows lo..hi COLD if every one has a side that follows from the pose alone; return whether that is so."""
+def all_sided(lo, hi, node):
+    """Return whether every row of lo..hi has a side that follows from the pose alone."""
     for k in range(lo, hi):
         if node[k, lay.TOUCH] == 0.0 and not (sided(k, node) or one_sided(k, node)):
             return False
+    return True
+
+
+@jit
+def forget(lo, hi, node):
+    """Make rows lo..hi COLD, as if there were no solution before."""
     for k in range(lo, hi):
         node[k, S_MODE] = lay.COLD
-    return True
+        for i in range(1, lay.STATE):
+            node[k, S_MODE + i] = 0.0
