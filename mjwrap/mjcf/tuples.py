@@ -138,8 +138,8 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
         else:
             what = kind.name.removeprefix("mjOBJ_").lower()
             raise ModelError(
-                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, joint, "
-                f"numeric, or a text whose name contains one of: {listed(TEXTS)}"
+                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, "
+                f"or a text whose name contains one of: {listed(TEXTS)}"
             )
     _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
     _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)

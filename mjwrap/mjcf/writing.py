@@ -9,6 +9,7 @@ import mujoco
 
 from mjwrap import validation
 from mjwrap.errors import ModelError
+from mjwrap.mjcf.moving_points import is_muscle_tuple
 from mjwrap.mjcf.names import listed
 from mjwrap.mjcf.parameters import (
     DYNAMICS,
@@ -52,7 +53,7 @@ def set_laws(
     validation.instance(laws, Mapping, "laws", ModelError, "a dict of laws by the name of the muscle")
     validation.optional(dynamics, ActivationDynamics, "dynamics", ModelError, "an ActivationDynamics")
     actuators = {actuator.name: actuator for actuator in spec.actuators}
-    tuples = {entry.name: entry for entry in spec.tuples if "mjwrap" in entry.name}
+    tuples = {entry.name: entry for entry in spec.tuples if is_muscle_tuple(entry.name)}
     by_actuator = {_actuator_of(entry): entry for entry in tuples.values()}
     free = {name.replace("mjwrap_", ""): e for name, e in tuples.items() if not _actuator_of(e)}
     unknown = [name for name in laws if name not in actuators and name not in free]
