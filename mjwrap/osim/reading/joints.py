@@ -183,6 +183,7 @@ def _coordinates(
                 element.flag("clamped", default=False),
                 element.flag("locked", default=False),
                 None if prescribed is None else read_function(prescribed),
+                element.flag("is_free_to_satisfy_constraints", default=False),
             )
         )
     return tuple(result)

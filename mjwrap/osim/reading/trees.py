@@ -1,8 +1,6 @@
-"""The tree of bodies: joints that lead away from ground, turned round where they do not, and free ones for the rest."""
+"""How joints connect bodies to ground, and the free joints of bodies that none connects."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,80 +11,39 @@ from mjwrap.osim.reading.nodes import Node
 
 
 def connected(bodies: list[Node], joints: list[Joint], elements: list[Node]) -> list[Joint]:
-    """Return the joints so that each body but ground is the child of one of them, whose parent is nearer to ground.
+    """Return the joints, with a free one for every body or chain of bodies that none connects to ground, as in OpenSim.
 
-    A joint that leads towards ground is turned round. A body to which no joint leads gets a free one, as in OpenSim.
-    Raises OsimError where bodies form a loop.
+    Raises OsimError for a joint of a body with itself, and for bodies whose joints form a circle without ground.
     """
+    for joint, node in zip(joints, elements, strict=True):
+        if joint.parent.body == joint.child.body:
+            raise node.error(f"both its frames are on '{joint.child.body}'; put one of them on another body")
     result = list(joints)
-    reached, waiting = {GROUND}, list(range(len(joints)))
+    children = {joint.child.body: node for joint, node in zip(joints, elements, strict=True)}
+    reached = _reached({GROUND}, joints)
     while True:
-        waiting = _forward(result, elements, reached, waiting)
-        if not waiting and all(node.name in reached for node in bodies):
-            return result
-        back = next((i for i in waiting if result[i].child.body in reached), None)
-        if back is not None:
-            result[back] = turned_round(result[back], elements[back])
-            continue
-        children = {result[i].child.body for i in waiting}
         loose = [node for node in bodies if node.name not in reached]
+        if not loose:
+            return result
         base = next((node for node in loose if node.name not in children), None)
         if base is None:
-            raise elements[waiting[0]].error(
-                f"bodies form a loop: {', '.join(sorted(children))}; attach one of them to ground"
-            )
-        base.note("no joint leads to it; as in OpenSim it moves freely")
+            circle = ", ".join(node.name for node in loose)
+            raise children[loose[0].name].error(f"bodies form a loop: {circle}; join one of them to ground")
+        base.note("no joint connects it to ground; as in OpenSim it moves freely")
         result.append(free_joint(base.name, f"free_{base.name}"))
-        reached.add(base.name)
+        reached |= _reached({base.name}, joints)
 
 
-def _forward(joints: list[Joint], elements: list[Node], reached: set[str], waiting: list[int]) -> list[int]:
-    """Add the bodies to which joints lead from those reached; return the joints that lead from other bodies."""
-    before = -1
-    while len(waiting) != before:
-        before, later = len(waiting), []
-        for i in waiting:
-            parent, child = joints[i].parent.body, joints[i].child.body
-            if parent in reached and child in reached:
-                raise elements[i].error(
-                    f"closes a loop of bodies: '{parent}' and '{child}' are already connected by other joints; "
-                    "replace one of these by a constraint"
-                )
-            if parent in reached:
-                reached.add(child)
-            else:
-                later.append(i)
-        waiting = later
-    return waiting
-
-
-def turned_round(joint: Joint, node: Node) -> Joint:
-    """Return the joint with parent and child swapped, for the same coordinates; not possible for all joints."""
-    turns = any(not _zero(axis) for axis in joint.rotations)
-    moves = any(not _zero(axis) for axis in joint.translations)
-    if joint.radii is not None or (turns and moves):
-        raise node.error(
-            "leads towards ground and both turns and moves its child, which cannot be turned round; "
-            "swap parent_frame and child_frame"
-        )
-    node.note("leads towards ground; parent and child are swapped, with the same coordinates")
-    first, second, third = joint.rotations
-    along = joint.translations
-    return replace(
-        joint,
-        parent=joint.child,
-        child=joint.parent,
-        rotations=(_opposite(third), _opposite(second), _opposite(first)),
-        translations=(_opposite(along[0]), _opposite(along[1]), _opposite(along[2])),
-    )
-
-
-def _zero(axis: Axis) -> bool:
-    return axis.function.is_constant and axis.function(0.0).item() == 0.0
-
-
-def _opposite(axis: Axis) -> Axis:
-    return replace(axis, axis=-axis.axis)
+def _reached(start: set[str], joints: list[Joint]) -> set[str]:
+    """Return the bodies that joints connect to some of them, in either direction."""
+    reached, before = set(start), -1
+    while len(reached) != before:
+        before = len(reached)
+        for joint in joints:
+            ends = {joint.parent.body, joint.child.body}
+            if ends & reached:
+                reached |= ends
+    return reached
 
 
 def free_joint(body: str, name: str) -> Joint:
