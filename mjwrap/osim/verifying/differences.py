@@ -21,7 +21,7 @@ UNEXPLAINED = "not explained"
 
 @dataclass(frozen=True)
 class Difference:
-    """A difference that needs a reason: of `what` ("length", ...), in element `name`, at the pose with number `pose`."""
+    """A difference that needs a reason: of `what` ("length", ...) in element `name` at pose number `pose`."""
 
     what: str
     name: str

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ImportedNumbers:
-    """An imported model's numbers at one pose, named and ordered as in `PoseNumbers`; arrays where a name has several."""
+    """An imported model's numbers at one pose, with the names and the order of `PoseNumbers`."""
 
     bodies: dict[str, Array]
     mass: Array

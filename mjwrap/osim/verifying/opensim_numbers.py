@@ -43,7 +43,7 @@ def compute_reference(
     motions: bool = True,
     progress: Callable[[int, int], object] | None = None,
 ) -> Reference:
-    """Return OpenSim's numbers of a model file at the default pose and at random poses; moment arms at the first `arms`.
+    """Return OpenSim's numbers of a model file at the default pose and at random ones; moment arms at the first `arms`.
 
     progress: called with the number of poses done and that of all. `OsimError` where opensim is missing or refuses the
     file.
