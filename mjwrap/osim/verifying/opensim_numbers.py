@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import math
 from collections.abc import Callable
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
-from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference
+from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
 
 Array = NDArray[np.float64]
 ACTIVATIONS = (0.05, 0.5, 1.0)
@@ -104,7 +103,7 @@ class _Computer:
                 progress(k + 1, poses + 1)
         return Reference(
             model=self.path.name,
-            sha256=hashlib.sha256(self.path.read_bytes()).hexdigest(),
+            sha256=sha256_of(self.path),
             opensim=str(self.opensim.GetVersion()),
             independent=self.independent,
             activations=list(ACTIVATIONS),

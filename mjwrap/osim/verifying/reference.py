@@ -5,6 +5,7 @@ SI units; angles in rad. Arrays of a pose have the order of the names in `Refere
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -60,6 +61,11 @@ class Reference:
         """Write the numbers as JSON, in full precision."""
         text = json.dumps({"format": FORMAT, **asdict(self)}, indent=None, separators=(",", ":"))
         Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def sha256_of(path: str | Path) -> str:
+    """Return the fingerprint by which numbers know the file that they are of."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def read_reference(path: str | Path) -> Reference:
