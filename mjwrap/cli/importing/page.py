@@ -13,6 +13,8 @@ from mjwrap.files.atomic import PartFile
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Entry, Report
 from mjwrap.osim.verifying.differences import UNEXPLAINED, Verification
 
+_OUTCOMES = (EXACT, APPROXIMATED, LEFT_OUT)
+
 
 def write_page(
     output: PartFile, model: str, command: str, report: Report, found: Verification | None
@@ -25,9 +27,9 @@ def write_page(
         command=command,
         versions=f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__}",
         version=report.version,
-        outcomes=(EXACT, APPROXIMATED, LEFT_OUT),
-        totals=[(o, sum(n for (_, outcome), n in counts.items() if outcome == o)) for o in (EXACT, APPROXIMATED, LEFT_OUT)],
-        kinds=[(kind, [counts.get((kind, o), 0) for o in (EXACT, APPROXIMATED, LEFT_OUT)]) for kind in kinds],
+        outcomes=_OUTCOMES,
+        totals=[(o, sum(n for (_, outcome), n in counts.items() if outcome == o)) for o in _OUTCOMES],
+        kinds=[(kind, [counts.get((kind, o), 0) for o in _OUTCOMES]) for kind in kinds],
         sections=[(o, [_entry(e) for e in report.entries if e.outcome == o]) for o in (LEFT_OUT, APPROXIMATED, EXACT)],
         verification=_verification(found) if found is not None else None,
     )  # fmt: skip
@@ -65,8 +67,8 @@ def _verification(found: Verification) -> dict[str, object]:
             for q in found.quantities
         ],
         "differences": [
-            [d.what, d.name, str(d.pose), f"{d.opensim:.6g}", f"{d.mjwrap:.6g}", f"{d.mjwrap - d.opensim:+.3g} {d.unit}",
-             d.reason]
+            [d.what, d.name, str(d.pose), f"{d.opensim:.6g}", f"{d.mjwrap:.6g}",
+             f"{d.mjwrap - d.opensim:+.3g} {d.unit}", d.reason]
             for d in differences
         ],
         "missing": found.missing,
