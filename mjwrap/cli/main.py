@@ -15,6 +15,7 @@ from mjwrap.cli.common.errors import RUN_FAILED, USER_ERROR, RunError
 from mjwrap.cli.common.output import note_inputs, say, written
 
 COMMANDS = {
+    "import": "turn an OpenSim model (.osim) into a MuJoCo model with geodesic muscles",
     "run": "simulate a model with its muscles along geodesic paths",
     "plot": "plot lengths, moment arms and forces over a joint, with tables of data over them",
     "compare": "compare MuJoCo's built-in tendons with mjwrap's paths on the same model",
@@ -25,6 +26,7 @@ COMMANDS = {
     "warmup": "compile everything in advance, so that later commands start faster",
 }
 EVALUATING = ("run", "compare", "plot", "inspect", "check", "warmup")  # compute forces of muscles
+ROOMS = {"import": "importing"}  # where a command's name is a word of Python
 HELP = """usage: mjwrap COMMAND ...
        mjwrap COMMAND --help
        mjwrap --version
@@ -88,7 +90,7 @@ def _command(given: list[str]) -> int:
 
 def module_of(name: str) -> ModuleType:
     """Return the module of a command, which has its help text, `add_arguments` and `execute`."""
-    room = importlib.import_module(f"mjwrap.cli.{name}")
+    room = importlib.import_module(f"mjwrap.cli.{ROOMS.get(name, name)}")
     return importlib.import_module(f"{room.__name__}.command") if hasattr(room, "__path__") else room
 
 

@@ -1,0 +1,1 @@
+"""`mjwrap import`: turn an OpenSim model into a MuJoCo model, with a report."""

@@ -1,0 +1,1 @@
+"""Verify an imported model against OpenSim: numbers of OpenSim itself, or numbers frozen from it, beside mjwrap's."""

@@ -1,0 +1,208 @@
+"""Compare an imported model's numbers with OpenSim's, and give the reason for each large difference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.osim.verifying.imported import ImportedModel, ImportedNumbers
+from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference
+
+Array = NDArray[np.float64]
+LARGE = 1e-3  # [m] a difference of length or moment arm that needs a reason
+RELATIVE = 1e-2  # the same of a tension, as a share of the larger one
+SHORT_ARC = 1e-6  # [m] an arc shorter than its chord by more is wrong
+UNEXPLAINED = "not explained"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A difference that needs a reason: of `what` ("length", ...) in element `name` at pose number `pose`."""
+
+    what: str
+    name: str
+    pose: int
+    opensim: float
+    mjwrap: float
+    unit: str
+    reason: str
+
+
+@dataclass
+class Quantity:
+    """All comparisons of one quantity: how many, the largest and the median difference, and how many within `tight`."""
+
+    what: str
+    unit: str
+    tight: float
+    differences: list[float] = field(default_factory=list)
+    worst: str = ""
+
+    def add(self, difference: float, where: str) -> None:
+        """Add a difference and where it was seen."""
+        size = abs(difference)
+        if not self.differences or not size <= max(self.differences):
+            self.worst = where
+        self.differences.append(size)
+
+    @property
+    def count(self) -> int:
+        return len(self.differences)
+
+    @property
+    def largest(self) -> float:
+        return max(self.differences, default=0.0)
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.differences)) if self.differences else 0.0
+
+    @property
+    def share(self) -> float:
+        """The share of differences up to `tight`."""
+        return sum(d <= self.tight for d in self.differences) / max(self.count, 1)
+
+
+@dataclass
+class Verification:
+    """The result: quantities, differences with their reasons, and what could not be compared."""
+
+    reference: Reference
+    quantities: list[Quantity]
+    differences: list[Difference]
+    missing: list[str]
+
+    @property
+    def unexplained(self) -> list[Difference]:
+        """The large differences without a reason."""
+        return [d for d in self.differences if d.reason.startswith(UNEXPLAINED)]
+
+
+def verify(
+    model: mujoco.MjModel,
+    reference: Reference,
+    progress: Callable[[int, int], object] | None = None,
+) -> Verification:
+    """Compare an imported model, compiled, with OpenSim's numbers of the same file.
+
+    progress: called with the number of poses done and that of all.
+    """
+    imported = ImportedModel(model)
+    every = {
+        "position": Quantity("position of bodies", "m", 1e-9),
+        "rotation": Quantity("rotation of bodies", "rad", 1e-9),
+        "mass": Quantity("reduced mass matrix, share of its diagonal", "", 1e-9),
+        "straight": Quantity("length of paths without contact", "m", 1e-12),
+        "wrapped": Quantity("length of paths with contact", "m", 1e-9),
+        "arm": Quantity("moment arms of paths without contact", "m", 5e-7),
+        "wrapped arm": Quantity("moment arms of paths with contact", "m", 5e-7),
+        "law": Quantity("tension at OpenSim's length, share of the maximum force", "", 1e-7),
+        "tension": Quantity("tension at mjwrap's length, share of the maximum force", "", 1e-7),
+    }
+    found = Verification(reference, [], [], [*reference.notes])
+    known = set(imported.muscles.names)
+    lost = [name for name in (reference.poses[0].lengths if reference.poses else ()) if name not in known]
+    if lost:
+        found.missing.append(f"paths that the imported model does not have: {', '.join(lost)}")
+    for k, pose in enumerate(reference.poses):
+        ours = imported.at(pose, reference.independent, reference.activations)
+        _compare_bodies(every, pose, ours, k)
+        _compare_paths(every, found, imported, pose, ours, k)
+        if progress is not None:
+            progress(k + 1, len(reference.poses))
+    for name, motion in (("passive motion", reference.passive), ("driven motion", reference.driven)):
+        if motion is not None:
+            _compare_motion(every, imported, name, motion)
+    found.quantities = [quantity for quantity in every.values() if quantity.count]
+    return found
+
+
+def _compare_bodies(every: dict[str, Quantity], pose: PoseNumbers, ours: ImportedNumbers, k: int) -> None:
+    for name, place in pose.bodies.items():
+        theirs, mine = np.array(place), ours.bodies[name]
+        every["position"].add(float(np.abs(mine[:3] - theirs[:3]).max()), f"{name}, pose {k}")
+        turn = mine[3:].reshape(3, 3) @ theirs[3:].reshape(3, 3).T
+        skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        angle = float(np.arctan2(np.linalg.norm(skew), 0.5 * (np.trace(turn) - 1.0)))
+        every["rotation"].add(angle, f"{name}, pose {k}")
+    if pose.mass is not None:
+        theirs = np.array(pose.mass)
+        scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+        every["mass"].add(float((np.abs(ours.mass - theirs) / scale).max()), f"pose {k}")
+
+
+def _compare_paths(
+    every: dict[str, Quantity],
+    found: Verification,
+    imported: ImportedModel,
+    pose: PoseNumbers,
+    ours: ImportedNumbers,
+    k: int,
+) -> None:
+    for name, theirs in pose.lengths.items():
+        mine = ours.lengths.get(name)
+        if mine is None:
+            continue
+        touches = ours.touched[name] or name in pose.wraps
+        every["wrapped" if touches else "straight"].add(mine - theirs, f"{name}, pose {k}")
+        if not abs(mine - theirs) <= LARGE:
+            found.differences.append(
+                Difference("length", name, k, theirs, mine, "m", _reason(name, pose, ours, mine - theirs))
+            )
+        for coordinate, arm in pose.moment_arms.get(name, {}).items():
+            own = ours.moment_arms[name][coordinate]
+            every["wrapped arm" if touches else "arm"].add(own - arm, f"{name} about {coordinate}, pose {k}")
+            if not abs(own - arm) <= LARGE:
+                why = _reason(name, pose, ours, mine - theirs)
+                about = f"{name} about {coordinate}"
+                found.differences.append(Difference("moment arm", about, k, arm, own, "m", why))
+    for name, law in ours.laws.items():
+        strongest = float(getattr(imported.muscles[name].parameters, "max_isometric_force", 0.0))
+        if strongest <= 0.0:
+            continue
+        for i, tension in enumerate(pose.tensions[name]):
+            if tension is None:
+                continue
+            where = f"{name} at activation {found.reference.activations[i]:g}, pose {k}"
+            every["law"].add((law[i] - tension) / strongest, where)
+            every["tension"].add((ours.tensions[name][i] - tension) / strongest, where)
+            gap = abs(law[i] - tension)
+            if not gap <= RELATIVE * max(abs(tension), 1e-3 * strongest):
+                found.differences.append(
+                    Difference(
+                        "tension", where, k, tension, float(law[i]), "N", f"{UNEXPLAINED}: same length"
+                    )
+                )
+
+
+def _reason(name: str, pose: PoseNumbers, ours: ImportedNumbers, gap: float) -> str:
+    """Return why mjwrap's path is longer than OpenSim's by `gap` [m], as far as it can be seen."""
+    contacts = pose.wraps.get(name, {})
+    short = {o: chord - arc for o, (arc, chord) in contacts.items() if arc < chord - SHORT_ARC}
+    if short:
+        which = ", ".join(f"{o} by {1e3 * size:.2f} mm" for o, size in short.items())
+        return f"OpenSim's arc is shorter than its own chord on {which}"
+    if name in ours.statuses:
+        return f"mjwrap has no path: {ours.statuses[name]}"
+    if contacts and not ours.touched[name]:
+        return f"OpenSim wraps {', '.join(contacts)}; the geodesic has lifted off"
+    if ours.touched[name] and not contacts:
+        return "the geodesic touches a surface that OpenSim's path does not wrap"
+    if len(contacts) > 1:
+        return "several surfaces: OpenSim's classic path wraps one after the other and stops at 0.5 mm"
+    return f"{UNEXPLAINED}: the geodesic is {'longer' if gap > 0 else 'shorter'}"
+
+
+def _compare_motion(
+    every: dict[str, Quantity], imported: ImportedModel, name: str, motion: MotionNumbers
+) -> None:
+    ours = imported.motion(motion)
+    quantity = Quantity(f"coordinates in the {name}, {motion.time[-1]:g} s", "rad, m", 1e-4)
+    for coordinate, values in ours.items():
+        theirs = np.array(motion.coordinates[coordinate])
+        quantity.add(float(np.abs(values - theirs).max()), coordinate)
+    every[name] = quantity

@@ -1,0 +1,155 @@
+"""Compute for an imported model the numbers that `reference.py` has of OpenSim."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.muscles.bench import simulate_muscle
+from mjwrap.osim.coordinates import set_coordinates
+from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
+from mjwrap.system import MuscleSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ImportedNumbers:
+    """An imported model's numbers at one pose, with the names and the order of `PoseNumbers`."""
+
+    bodies: dict[str, Array]
+    mass: Array
+    lengths: dict[str, float]
+    statuses: dict[str, str]  # of paths that are not converged: why
+    moment_arms: dict[str, dict[str, float]]
+    tensions: dict[str, Array]  # along the path's own length
+    laws: dict[str, Array]  # of the same law, at OpenSim's path length
+    touched: dict[str, bool]  # whether the path touches a surface
+
+
+class ImportedModel:
+    """An imported model, evaluated at OpenSim's poses."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self.muscles = MuscleSystem(model)
+        self._joints = {model.joint(i).name: i for i in range(model.njnt)}
+
+    def at(self, pose: PoseNumbers, independent: list[str], activations: list[float]) -> ImportedNumbers:
+        """Return the numbers at a pose of OpenSim's; only its independent coordinates are set, the others follow."""
+        model, data, muscles = self.model, self.data, self.muscles
+        mujoco.mj_resetData(model, data)
+        set_coordinates(model, data, {name: pose.coordinates[name] for name in independent})
+        mujoco.mj_forward(model, data)
+        muscles.reset(data)
+        muscles.forward(data)
+        bodies = {
+            name: np.concatenate([data.body(name).xpos, data.body(name).xmat.ravel()]) for name in pose.bodies
+        }
+        lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
+        statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
+        touched = {name: len(muscles.contact_points(i)) > 0 for i, name in enumerate(muscles.names)}
+        arms: dict[str, dict[str, float]] = {}
+        if pose.moment_arms:
+            found = muscles.moment_arms(data, independent)
+            arms = {
+                name: dict(zip(independent, found[i].tolist(), strict=True))
+                for i, name in enumerate(muscles.names)
+            }
+        tensions, laws = {}, {}
+        for name in pose.tensions:
+            if name not in muscles:
+                continue
+            law = muscles[name].parameters
+            tensions[name] = self._tension(law, lengths[name], activations)
+            laws[name] = self._tension(law, pose.lengths[name], activations)
+        return ImportedNumbers(
+            bodies, self._mass(independent), lengths, statuses, arms, tensions, laws, touched
+        )
+
+    def _tension(self, law: object, length: float, activations: list[float]) -> Array:
+        """Return the tension at rest at each activation [N]."""
+        found = [
+            simulate_muscle(law, [0.0], length, activation=a).tension[0]  # type: ignore[arg-type]
+            for a in activations
+        ]
+        return np.array(found)
+
+    def _mass(self, independent: list[str]) -> Array:
+        """Return NᵀMN about the rates of the independent coordinates."""
+        model, data = self.model, self.data
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, full, data.qM)
+        couplings = CoupledJoints(model)
+        n = couplings.matrix(data.qpos)
+        dofs = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
+        n = n[:, np.searchsorted(couplings.independent, dofs)]
+        return n.T @ full @ n
+
+    def motion(self, given: MotionNumbers, timestep: float | None = None) -> Mapping[str, Array]:
+        """Return the coordinates (frames,) along the motion that starts as OpenSim's did.
+
+        timestep [s]: None for the model's own. A passive motion is that without muscles.
+        """
+        model = self.model
+        before = model.opt.timestep
+        if timestep is not None:
+            model.opt.timestep = timestep
+        try:
+            return self._motion(given)
+        finally:
+            model.opt.timestep = before
+
+    def _motion(self, given: MotionNumbers) -> Mapping[str, Array]:
+        model, muscles = self.model, self.muscles
+        data = mujoco.MjData(model)
+        mujoco.mj_resetData(model, data)
+        muscles.reset(data)
+        passive = given.excitation is None
+        names = [name for name in given.coordinates if name in self._joints]
+        places = [int(model.jnt_qposadr[self._joints[name]]) for name in names]
+        rows = np.zeros((len(given.time), len(names)))
+        if not passive:
+            self._start(data, given)
+        for k, time in enumerate(given.time):
+            steps = round((time - data.time) / model.opt.timestep)
+            if steps > 0:
+                if passive:
+                    self._step_passively(data, steps)
+                else:
+                    muscles.step(data, steps)
+            rows[k] = data.qpos[places]
+        return {name: rows[:, i] for i, name in enumerate(names)}
+
+    def _step_passively(self, data: mujoco.MjData, steps: int) -> None:
+        """Step with gravity and couplings, without muscles, springs and dampers."""
+        model = self.model
+        before = int(model.opt.disableflags)
+        flags = mujoco.mjtDisableBit
+        model.opt.disableflags = (
+            before | int(flags.mjDSBL_ACTUATION) | int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_CONTACT)
+        )
+        try:
+            self.muscles.step(data, steps)
+        finally:
+            model.opt.disableflags = before
+
+    def _start(self, data: mujoco.MjData, given: MotionNumbers) -> None:
+        """Give the muscles OpenSim's states at the start."""
+        model = self.model
+        for name in given.activation:
+            actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+            if actuator < 0:
+                continue
+            data.ctrl[int(model.actuator_ctrladr[actuator])] = given.excitation
+            first, count = int(model.actuator_actadr[actuator]), int(model.actuator_actnum[actuator])
+            if count > 0:
+                data.act[first] = given.activation[name]
+            if count > 1:
+                data.act[first + 1] = given.fiber_length[name]

@@ -1,0 +1,300 @@
+"""Compute a `Reference` with the opensim package: the only file that imports it."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.errors import OsimError
+from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
+
+Array = NDArray[np.float64]
+ACTIVATIONS = (0.05, 0.5, 1.0)
+WIDEST = {
+    1: math.pi,
+    2: 1.0,
+}  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
+ACCURACY = 1e-9  # of OpenSim's integrator
+PASSIVE, DRIVEN, FRAMES = 0.3, 0.5, 31  # durations [s], and frames of a motion
+EXCITATION = 0.2
+
+
+def has_opensim() -> bool:
+    """Whether the opensim package can be imported."""
+    try:
+        importlib.import_module("opensim")
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+def compute_reference(
+    path: str | Path,
+    poses: int = 50,
+    arms: int = 10,
+    seed: int = 0,
+    motions: bool = True,
+    progress: Callable[[int, int], object] | None = None,
+) -> Reference:
+    """Return OpenSim's numbers of a model file at the default pose and at random ones; moment arms at the first `arms`.
+
+    progress: called with the number of poses done and that of all. `OsimError` where opensim is missing or refuses the
+    file.
+    """
+    try:
+        opensim: Any = importlib.import_module("opensim")
+    except (ImportError, OSError) as error:
+        raise OsimError(f"the opensim package is not there ({error}): pip install opensim") from None
+    opensim.Logger.setLevelString("off")
+    try:
+        return _Computer(opensim, Path(path)).compute(poses, arms, seed, motions, progress)
+    except RuntimeError as error:
+        raise OsimError(f"OpenSim cannot use '{path}': {' '.join(str(error).split())[:300]}") from None
+
+
+class _Computer:
+    def __init__(self, opensim: Any, path: Path) -> None:
+        self.opensim, self.path = opensim, path
+        self.notes: list[str] = []
+        self.model = opensim.Model(str(path))
+        self.model.set_assembly_accuracy(1e-12)
+        self.state = self.model.initSystem()
+        every = self.model.getCoordinateSet()
+        self.coordinates = {every.get(i).getName(): every.get(i) for i in range(every.getSize())}
+        self.independent = [
+            name for name, found in self.coordinates.items() if not found.isConstrained(self.state)
+        ]
+        forces = self.model.getForceSet()
+        self.paths: dict[str, Any] = {}
+        for i in range(forces.getSize()):
+            force = forces.get(i)
+            for kind in ("Muscle", "Ligament", "PathSpring", "PathActuator"):
+                cast = getattr(opensim, kind).safeDownCast(force)
+                if cast is not None:
+                    self.paths[force.getName()] = cast
+                    break
+        muscles = self.model.getMuscles()
+        self.muscles = {muscles.get(i).getName(): muscles.get(i) for i in range(muscles.getSize())}
+        bodies = self.model.getBodySet()
+        self.bodies = {bodies.get(i).getName(): bodies.get(i) for i in range(bodies.getSize())}
+        self._places = self._find_places()
+
+    def compute(
+        self,
+        poses: int,
+        arms: int,
+        seed: int,
+        motions: bool,
+        progress: Callable[[int, int], object] | None,
+    ) -> Reference:
+        rng = np.random.default_rng(seed)
+        found = []
+        for k in range(poses + 1):
+            if k > 0:
+                self._draw(rng)
+            found.append(self._pose(k <= arms))
+            if progress is not None:
+                progress(k + 1, poses + 1)
+        return Reference(
+            model=self.path.name,
+            sha256=sha256_of(self.path),
+            opensim=str(self.opensim.GetVersion()),
+            independent=self.independent,
+            activations=list(ACTIVATIONS),
+            poses=found,
+            passive=self._motion(None, PASSIVE) if motions else None,
+            driven=self._motion(EXCITATION, DRIVEN) if motions and self.muscles else None,
+            notes=self.notes,
+        )
+
+    def _draw(self, rng: np.random.Generator) -> None:
+        """Move the model to a random pose within the ranges of its coordinates."""
+        for name in self.independent:
+            coordinate = self.coordinates[name]
+            widest = WIDEST.get(int(coordinate.getMotionType()), math.pi)
+            low, high = max(coordinate.getRangeMin(), -widest), min(coordinate.getRangeMax(), widest)
+            value = rng.uniform(low, high) if low < high else coordinate.getDefaultValue()
+            coordinate.setValue(self.state, float(value), False)
+        self.model.assemble(self.state)
+
+    def _pose(self, with_arms: bool) -> PoseNumbers:
+        model, state = self.model, self.state
+        for name in self.independent:
+            self.coordinates[name].setSpeedValue(state, 0.0)
+        model.realizePosition(state)
+        bodies = {}
+        for name, body in self.bodies.items():
+            place = body.getTransformInGround(state)
+            position, turn = place.p(), place.R().asMat33()
+            bodies[name] = [position.get(i) for i in range(3)] + [
+                turn.get(i, j) for i in range(3) for j in range(3)
+            ]
+        values = {name: float(c.getValue(state)) for name, c in self.coordinates.items()}
+        mass = self._mass()
+        lengths = {name: float(_path(found).getLength(state)) for name, found in self.paths.items()}
+        arms: dict[str, dict[str, float]] = {}
+        if with_arms:
+            for name, found in self.paths.items():
+                path = _path(found)
+                arms[name] = {
+                    c: float(path.computeMomentArm(state, self.coordinates[c])) for c in self.independent
+                }
+        tensions = {name: self._tensions(muscle) for name, muscle in self.muscles.items()}
+        wraps = {name: found for name, force in self.paths.items() if (found := self._contacts(_path(force)))}
+        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps)
+
+    def _contacts(self, path: Any) -> dict[str, list[float]]:
+        """Return arc and chord [m] of the contacts of a path, by wrap object."""
+        if not hasattr(path, "getCurrentPath"):
+            return {}
+        points = path.getCurrentPath(self.state)
+        found: dict[str, list[float]] = {}
+        before: Array | None = None
+        for i in range(points.getSize()):
+            point = self.opensim.PathWrapPoint.safeDownCast(points.get(i))
+            if point is None or point.getWrapObject() is None:
+                before = None
+                continue
+            here = point.getLocationInGround(self.state)
+            place = np.array([here.get(k) for k in range(3)])
+            if before is not None:
+                chord = float(np.linalg.norm(place - before))
+                found[point.getWrapObject().getName()] = [float(point.getWrapLength(self.state)), chord]
+            before = place if before is None else None
+        return found
+
+    def _tensions(self, muscle: Any) -> list[float | None]:
+        """Return the tension of a muscle at equilibrium, at rest, at each of the activations."""
+        found: list[float | None] = []
+        for activation in ACTIVATIONS:
+            try:
+                muscle.setActivation(self.state, activation)
+                muscle.computeEquilibrium(self.state)
+                self.model.realizeDynamics(self.state)
+                found.append(float(muscle.getTendonForce(self.state)))
+            except RuntimeError:
+                found.append(None)
+        return found
+
+    def _mass(self) -> list[list[float]] | None:
+        """Return NᵀMN about the rates of the independent coordinates, from Simbody's M and constraint matrix."""
+        model, state, opensim = self.model, self.state, self.opensim
+        matter = model.getMatterSubsystem()
+        mass = opensim.Matrix()
+        matter.calcM(state, mass)
+        size = mass.nrow()
+        m = np.array([[mass.get(i, j) for j in range(size)] for i in range(size)]).reshape(size, size)
+        if len(self.coordinates) != size or not self.independent:
+            return None
+        rates = self._rates(size)  # (coordinates, u)
+        names = list(self.coordinates)
+        chosen = [names.index(name) for name in self.independent]
+        inverse = np.linalg.inv(rates)  # u from the coordinates' rates
+        constraints = opensim.Matrix()
+        matter.calcG(state, constraints)
+        rows = constraints.nrow()
+        g = np.array([[constraints.get(i, j) for j in range(size)] for i in range(rows)]).reshape(rows, size)
+        follow = [i for i in range(size) if i not in chosen]
+        n = np.zeros((size, len(chosen)))
+        n[chosen, np.arange(len(chosen))] = 1.0
+        if follow:
+            of_rates = g @ inverse
+            solved, _, rank, _ = np.linalg.lstsq(of_rates[:, follow], -of_rates[:, chosen], rcond=None)
+            if rank < len(follow):
+                return None
+            n[follow] = solved
+        reduced = (inverse @ n).T @ m @ (inverse @ n)
+        return reduced.tolist()
+
+    def _rates(self, size: int) -> Array:
+        """Return the rates of the coordinates for each unit velocity u, (coordinates, u)."""
+        state = self.state
+        found = np.zeros((len(self.coordinates), size))
+        for k in range(size):
+            u = self.opensim.Vector(size, 0.0)
+            u.set(k, 1.0)
+            state.setU(u)
+            self.model.realizeVelocity(state)
+            rates = state.getQDot()
+            found[:, k] = [rates.get(place) for place in self._places]
+        state.setU(self.opensim.Vector(size, 0.0))
+        self.model.realizeVelocity(state)
+        return found
+
+    def _find_places(self) -> list[int]:
+        """Return the place of each coordinate in OpenSim's vector q."""
+        found = []
+        for coordinate in self.coordinates.values():
+            value = float(coordinate.getValue(self.state))
+            before = self._q()
+            locked = coordinate.getLocked(self.state)
+            coordinate.setLocked(self.state, False)
+            coordinate.setValue(self.state, value + 0.125, False)
+            found.append(int(np.argmax(np.abs(self._q() - before))))
+            coordinate.setValue(self.state, value, False)
+            coordinate.setLocked(self.state, locked)
+        return found
+
+    def _q(self) -> Array:
+        q = self.state.getQ()
+        return np.array([q.get(i) for i in range(q.size())])
+
+    def _motion(self, excitation: float | None, duration: float) -> MotionNumbers | None:
+        """Return the motion from the default pose at rest, or None (with a note) where OpenSim fails."""
+        opensim = self.opensim
+        model = opensim.Model(str(self.path))
+        model.set_assembly_accuracy(1e-12)
+        forces = model.updForceSet()
+        for i in range(forces.getSize()):
+            muscle = opensim.Muscle.safeDownCast(forces.get(i))
+            if excitation is None or muscle is None:
+                forces.get(i).set_appliesForce(False)
+        controllers = model.updControllerSet()
+        for i in range(controllers.getSize()):
+            controllers.get(i).setEnabled(False)
+        if excitation is not None:
+            controller = opensim.PrescribedController()
+            controller.setName("mjwrap_excitation")
+            for name in self.muscles:
+                muscle = model.getMuscles().get(name)
+                controller.addActuator(muscle)
+                controller.prescribeControlForActuator(muscle.getName(), opensim.Constant(excitation))
+            model.addController(controller)
+        kind = "passive" if excitation is None else "driven"
+        try:
+            state = model.initSystem()
+            if excitation is not None:
+                model.equilibrateMuscles(state)
+            every = model.getCoordinateSet()
+            coordinates = {every.get(i).getName(): every.get(i) for i in range(every.getSize())}
+            muscles = {name: model.getMuscles().get(name) for name in self.muscles}
+            activation = (
+                {} if excitation is None else {n: float(m.getActivation(state)) for n, m in muscles.items()}
+            )
+            fiber = (
+                {} if excitation is None else {n: float(m.getFiberLength(state)) for n, m in muscles.items()}
+            )
+            manager = opensim.Manager(model)
+            manager.setIntegratorAccuracy(ACCURACY)
+            manager.initialize(state)
+            times = np.linspace(0.0, duration, FRAMES)
+            rows: dict[str, list[float]] = {name: [] for name in coordinates}
+            for time in times:
+                if time > 0.0:
+                    state = manager.integrate(float(time))
+                for name, coordinate in coordinates.items():
+                    rows[name].append(float(coordinate.getValue(state)))
+        except RuntimeError as error:
+            self.notes.append(f"the {kind} motion: {' '.join(str(error).split())[:200]}")
+            return None
+        return MotionNumbers(times.tolist(), rows, excitation, activation, fiber)
+
+
+def _path(force: Any) -> Any:
+    return force.getGeometryPath() if hasattr(force, "getGeometryPath") else force.get_GeometryPath()
