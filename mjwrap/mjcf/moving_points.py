@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import name_of
+from mjwrap.mjcf.tuple_names import MOVING
 
 Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj
-WORD = "mjwrap_moving_"
 SCALAR = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 _FORM = "P, then P-1 breaks, P origins and P rows of coefficients, the constant first"
 
@@ -47,8 +47,7 @@ class MovingSite(NamedTuple):
 
 def is_moving_tuple(name: str) -> bool:
     """Return whether a tuple of this name declares a moving site."""
-    return WORD in name
-
+    return MOVING in name
 
 
 def read_moving_axes(model: mujoco.MjModel) -> list[MovingAxis]:
