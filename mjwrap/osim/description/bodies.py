@@ -77,6 +77,7 @@ class Axis:
 class Joint:
     """A joint: its child frame is moved in the parent frame, then turned about three body-fixed axes.
 
+    As in the file, the child may be the body nearer to ground, and several joints may have one child.
     All joints are written so, pin, ball, free and the others too: an axis without motion has a constant function.
     EllipsoidJoint and ScapulothoracicJoint have `radii`: their translation is radii * (z of the turned frame), so that
     the origin stays on an ellipsoid. The fourth coordinate of a ScapulothoracicJoint then turns the child frame about

@@ -31,20 +31,32 @@ class Pose(NamedTuple):
 
 
 def body_poses(model: OsimModel, values: Mapping[str, float]) -> dict[str, Pose]:
-    """Return the pose of every body in ground, ground included, at the values of all coordinates (see `complete`)."""
+    """Return the pose of every body in ground, ground included, at the values of all coordinates (see `complete`).
+
+    A joint of two bodies that others have placed already, which closes a loop, is not regarded: the loop is closed only
+    where the values fit.
+    """
     poses = {GROUND: Pose(np.eye(3), np.zeros(3))}
     waiting = list(model.joints)
-    while waiting:
-        later = []
-        for joint in waiting:
-            if joint.parent.body not in poses:
-                later.append(joint)
-                continue
-            motion = joint_motion(joint, values)
-            parent = frame_pose(poses, joint.parent)
-            poses[joint.child.body] = parent.then(motion).then(_within(joint.child).inverse())
-        waiting = later
+    while (found := _next(waiting, poses)) is not None:
+        joint, backward = found
+        waiting = [other for other in waiting if other is not joint]
+        motion = joint_motion(joint, values)
+        near, far = (joint.child, joint.parent) if backward else (joint.parent, joint.child)
+        across = motion.inverse() if backward else motion
+        poses[far.body] = frame_pose(poses, near).then(across).then(_within(far).inverse())
     return poses
+
+
+def _next(waiting: list[Joint], poses: Mapping[str, Pose]) -> tuple[Joint, bool] | None:
+    """Return the next joint that places a body, and whether it leads from its child to its parent."""
+    for joint in waiting:
+        if joint.parent.body in poses and joint.child.body not in poses:
+            return joint, False
+    for joint in waiting:
+        if joint.child.body in poses and joint.parent.body not in poses:
+            return joint, True
+    return None
 
 
 def frame_pose(poses: Mapping[str, Pose], frame: Frame) -> Pose:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mjwrap.osim.description.bodies import GROUND, Axis, Coordinate, Frame, Joint
+from mjwrap.osim.description.bodies import Axis, Coordinate, Frame, Joint
 from mjwrap.osim.description.functions import Piecewise, constant, linear
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading.frames import Places, offset, socket
@@ -207,20 +207,3 @@ def _radii(node: Node, tag: str) -> Array:
     if not np.all(radii > 0.0):
         raise node.error(f"{tag} must be positive")
     return radii
-
-
-def free_joint(body: str, name: str) -> Joint:
-    """Return the free joint that OpenSim gives to a body without a joint."""
-    zero = Frame(GROUND, np.zeros(3), np.eye(3))
-    names = [f"{name}_coord_{i}" for i in range(6)]
-    axes = [Axis(np.eye(3)[i % 3], (names[i],), linear(1.0)) for i in range(6)]
-    coordinates = tuple(
-        Coordinate(
-            names[i], name, ROTATIONAL if i < 3 else TRANSLATIONAL, 0.0, 0.0, (-10.0, 10.0), False, False
-        )
-        for i in range(6)
-    )
-    child = Frame(body, np.zeros(3), np.eye(3))
-    return Joint(
-        name, "FreeJoint", zero, child, coordinates, (axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5])
-    )

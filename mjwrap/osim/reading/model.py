@@ -7,17 +7,18 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mjwrap.errors import OsimError
-from mjwrap.osim.description.bodies import GROUND, Joint
+from mjwrap.osim.description.bodies import GROUND
 from mjwrap.osim.description.forces import OtherForce
 from mjwrap.osim.description.model import Marker, OsimModel
 from mjwrap.osim.reading.constraints import read_constraint
 from mjwrap.osim.reading.document import read_document
 from mjwrap.osim.reading.forces import Known, read_force
 from mjwrap.osim.reading.frames import FRAMES, STATIONS, Places
-from mjwrap.osim.reading.joints import coordinate_nodes, free_joint, joint_nodes, read_joint
+from mjwrap.osim.reading.joints import coordinate_nodes, joint_nodes, read_joint
 from mjwrap.osim.reading.nodes import Node
 from mjwrap.osim.reading.paths import read_wrap, wrap_nodes
 from mjwrap.osim.reading.shapes import is_ground, read_body, read_contact_shape, read_meshes
+from mjwrap.osim.reading.trees import connected
 
 
 def read_osim(path: str | os.PathLike[str]) -> OsimModel:
@@ -56,7 +57,7 @@ class _Reader:
             read_joint(n, places, self.coordinate_names, name)
             for n, name in zip(joint_elements, names, strict=True)
         ]
-        joints = self._connected(bodies, joints, joint_elements)
+        joints = connected(bodies, joints, joint_elements)
         coordinates = {c.name: c for joint in joints for c in joint.coordinates}
         wrap_elements = wrap_nodes(model)
         wrap_names = _unique_names(wrap_elements)
@@ -127,34 +128,6 @@ class _Reader:
                 taken.add(name)
                 self.coordinate_names[id(node)] = name
                 self.places.add(node)
-
-    def _connected(self, bodies: list[Node], joints: list[Joint], elements: list[Node]) -> list[Joint]:
-        """Return the joints with a free one for every body without; bodies must form trees that start at ground."""
-        parents: dict[str, tuple[str, Node]] = {}
-        for joint, node in zip(joints, elements, strict=True):
-            child = joint.child.body
-            if child == GROUND:
-                raise node.error("its child frame is on ground; swap parent_frame and child_frame")
-            if child in parents:
-                raise node.error(
-                    f"body '{child}' is already the child of joint '{parents[child][1].name}'; "
-                    "replace one of the two by a constraint"
-                )
-            parents[child] = joint.parent.body, node
-        for start, (_, node) in parents.items():
-            body, seen = start, {start}
-            while body in parents:
-                body = parents[body][0]
-                if body in seen:
-                    raise node.error(
-                        f"bodies form a loop: {', '.join(sorted(seen))}; attach one of them to ground"
-                    )
-                seen.add(body)
-        for node in bodies:
-            if node.name not in parents:
-                node.note("has no joint; like in OpenSim it moves freely")
-                joints.append(free_joint(node.name, f"free_{node.name}"))
-        return joints
 
     def _others(self) -> list[OtherForce]:
         sets = ("ControllerSet", "ProbeSet", "ComponentSet", "components")
