@@ -127,13 +127,16 @@ def _write_locks(document: Document, report: Report, skeleton: Skeleton) -> None
     drivers = skeleton.drivers
     for name, coordinate in drivers.coordinates.items():
         held = coordinate.locked or coordinate.prescribed is not None
-        if not held or name in drivers.couplers or name not in drivers.carriers:
+        if not held or name in drivers.couplers:
             continue
-        write_hold(document, name)
+        driver = drivers.driver(name)
+        if driver is None or (name not in drivers.carriers and name not in drivers.substitutes):
+            continue
+        write_hold(document, driver[0])
         if coordinate.prescribed is None:
-            report.add("Coordinate", name, EXACT, f"locked: equality '{name}_locked' keeps its default value")
+            report.add("Coordinate", name, EXACT, f"locked: equality '{driver[0]}_locked' keeps its default value")
         elif coordinate.prescribed.is_constant:
-            report.add("Coordinate", name, EXACT, f"prescribed by a constant: equality '{name}_locked' keeps it")
+            report.add("Coordinate", name, EXACT, f"prescribed by a constant: equality '{driver[0]}_locked' keeps it")
         else:
-            report.add("Coordinate", name, APPROXIMATED, f"prescribed by a function of time: equality '{name}_locked' "
+            report.add("Coordinate", name, APPROXIMATED, f"prescribed by a function of time: equality '{driver[0]}_locked' "
                        "keeps its value at time 0")  # fmt: skip

@@ -12,7 +12,22 @@ from mjwrap.osim.description.functions import Piecewise
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.writing.motions import Motion, scaled
 from mjwrap.osim.writing.piece_algebra import composed
-from mjwrap.osim.writing.tree import Branch
+from mjwrap.osim.writing.quartics import TOLERANCE, inverse_pieces
+from mjwrap.osim.writing.tree import Branch, unused
+from mjwrap.osim.writing.unique_names import plain_name
+
+
+MOST_PIECES = 70  # of degree 4 in the 500 numbers of a numeric
+
+
+@dataclass(frozen=True)
+class Substitute:
+    """The motion, with the name of its joint, that stands for a coordinate, which is a function of the joint's qpos."""
+
+    joint: str
+    motion: Motion
+    inverse: Piecewise
+    short_inverse: Piecewise  # with so few pieces that a numeric of MuJoCo can hold them
 
 
 @dataclass
@@ -20,12 +35,13 @@ class Drivers:
     """The joints of coordinates.
 
     couplers: by dependent coordinate, each with its first coupler. carriers: the motion that shows a coordinate, by
-    its name. values: of all coordinates at the default pose [rad or m].
+    its name. substitutes: by independent coordinate that no motion shows. values: of all coordinates at the default pose [rad or m].
     """
 
     coordinates: dict[str, Coordinate]
     couplers: dict[str, Coupler]
     carriers: dict[str, Motion]
+    substitutes: dict[str, Substitute] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
 
     def dependence(self, name: str) -> tuple[str, Piecewise] | None:
@@ -36,18 +52,21 @@ class Drivers:
         function = coupler.function if coupler.scale == 1.0 else scaled(coupler.function, coupler.scale)
         return coupler.independent[0], function
 
-    def driver(self, name: str) -> tuple[str, Piecewise | None] | None:
+    def driver(self, name: str, *, precise: bool = False) -> tuple[str, Piecewise | None] | None:
         """Return the joint that gives a coordinate, and the coordinate as a function of its qpos; None: it is the qpos.
 
-        None instead of both where there is no such coordinate.
+        None instead of both where there is no such coordinate. precise: whether the function may have many pieces.
         """
         if name not in self.coordinates:
             return None
         dependence = self.dependence(name)
+        if name in self.substitutes:
+            each = self.substitutes[name]
+            return each.joint, each.inverse if precise else each.short_inverse
         if name in self.carriers or dependence is None:
             return name, None
         leader, function = dependence
-        above = self.driver(leader)
+        above = self.driver(leader, precise=precise)
         if above is None:
             return None
         return above[0], function if above[1] is None else composed(function, above[1])
@@ -92,9 +111,39 @@ def drivers_of(model: OsimModel, branches: list[Branch]) -> Drivers:
                 fits = step.turn == (coordinates[step.coordinate].motion == "rotational")
                 if known is None or (fits and not _fits(known, coordinates)):
                     carriers[step.coordinate] = step
-    drivers = Drivers(coordinates, couplers, carriers)
+    substitutes = _substitutes(branches, coordinates, carriers.keys() | couplers.keys())
+    drivers = Drivers(coordinates, couplers, carriers, substitutes)
     drivers.settle({name: default_of(c) for name, c in coordinates.items() if name not in couplers})
     return drivers
+
+
+def _substitutes(
+    branches: list[Branch], coordinates: dict[str, Coordinate], shown: set[str]
+) -> dict[str, Substitute]:
+    """Return motions that rise or fall all along with a coordinate that none shows; turns first."""
+    found: dict[str, Substitute] = {}
+    taken = set(coordinates)
+    steps = [(branch, step) for branch in branches for step in branch.chain if isinstance(step, Motion)]
+    for branch, step in sorted(steps, key=lambda pair: not pair[1].turn):
+        name = step.coordinate
+        if name in shown or name in found or not step.main:
+            continue
+        low, high = coordinates[name].range
+        room = 0.1 * (high - low)
+        inverse = inverse_pieces(step.function, low - room, high + room) if low < high else None
+        if inverse is not None:
+            joint = unused(plain_name(f"{branch.joint.name}_{step.name}"), taken)
+            found[name] = Substitute(joint, step, inverse, _shortened(step.function, low - room, high + room, inverse))
+    return found
+
+
+def _shortened(function: Piecewise, low: float, high: float, inverse: Piecewise) -> Piecewise:
+    """Return the inverse of a function with at most as many pieces as a numeric holds."""
+    tolerance = TOLERANCE
+    while len(inverse.origins) > MOST_PIECES and tolerance < 1e-3:
+        tolerance *= 4.0
+        inverse = inverse_pieces(function, low, high, tolerance) or inverse
+    return inverse
 
 
 def default_of(coordinate: Coordinate) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from mjwrap.osim.description.functions import Array, Piecewise
@@ -20,51 +22,121 @@ def quartic_pieces(function: Piecewise, low: float, high: float) -> Piecewise:
     if not rows[:, DEGREE + 1 :].any():
         return Piecewise(function.breaks, function.origins, rows[:, : DEGREE + 1], function.kind, function.error)
     edges = np.concatenate([[-np.inf], function.breaks, [np.inf]])
-    breaks: list[float] = []
-    origins: list[float] = []
-    coefficients: list[Array] = []
-    worst = 0.0
+    made = _Made()
     for piece in range(len(rows)):
         left, right = float(edges[piece]), float(edges[piece + 1])
-        if piece:
-            breaks.append(left)
-        if not rows[piece, DEGREE + 1 :].any():
-            origins.append(float(function.origins[piece]))
-            coefficients.append(rows[piece, : DEGREE + 1])
-            continue
-        single = Piecewise(np.zeros(0), function.origins[piece : piece + 1], rows[piece : piece + 1])
-        start = max(left, min(low, right - 1e-3))
-        stop = min(right, max(high, start + 1e-3))
-        ends = _split(single, start, stop)
+        if rows[piece, DEGREE + 1 :].any():
+            single = Piecewise(np.zeros(0), function.origins[piece : piece + 1], rows[piece : piece + 1])
+            start = max(left, min(low, right - 1e-3))
+            made.fit(single, left, start, min(right, max(high, start + 1e-3)))
+        else:
+            made.add(left, float(function.origins[piece]), rows[piece, : DEGREE + 1])
+    return made.function(function.kind, function.error)
+
+
+def inverse_pieces(
+    function: Piecewise, low: float, high: float, tolerance: float = TOLERANCE
+) -> Piecewise | None:
+    """Return the inverse of a function that rises, or falls, from `low` to `high`; None where it does neither.
+
+    Straight lines are inverted exactly. Beyond the values at `low` and `high` the last pieces go on.
+    """
+    breaks = function.breaks[(function.breaks > low) & (function.breaks < high)]
+    knots = np.concatenate([[low], breaks, [high]])
+    slopes = function(np.concatenate([np.linspace(a, b, 50) for a, b in zip(knots[:-1], knots[1:], strict=True)]), 1)
+    if slopes.max() * slopes.min() <= 0.0 or np.abs(slopes).min() < 1e-3 * np.abs(slopes).max():
+        return None
+    if slopes[0] < 0.0:
+        knots = knots[::-1]
+    made = _Made(tolerance)
+    for k in range(len(knots) - 1):
+        middle = 0.5 * (knots[k] + knots[k + 1])
+        piece = int(function.piece(middle))
+        row, origin = function.coefficients[piece], float(function.origins[piece])
+        start, stop = float(function(knots[k])), float(function(knots[k + 1]))
+        left = start if k else -np.inf
+        if row[2:].any():
+            single = Piecewise(np.zeros(0), function.origins[piece : piece + 1], row[None])
+            made.fit(_Inverse(single, float(knots[k]), float(knots[k + 1])), left, start, stop)
+        else:
+            made.add(left, float(row[0]), np.array([origin, 1.0 / row[1]]))
+    return made.function(function.kind, 0.0)
+
+
+class Smooth(Protocol):
+    """A function of one variable with a slope."""
+
+    def __call__(self, x: Array, derivative: int = 0, /) -> Array:
+        """Return y or its slope at x (n,)."""
+        ...
+
+
+class _Inverse:
+    """The inverse of a function between two points, by bisection and Newton's method."""
+
+    def __init__(self, function: Piecewise, start: float, stop: float) -> None:
+        self._function, self._start, self._stop = function, start, stop
+
+    def __call__(self, x: Array, derivative: int = 0, /) -> Array:
+        """Return the inverse or its slope at x (n,)."""
+        low, high = np.full(np.shape(x), self._start), np.full(np.shape(x), self._stop)
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            below = self._function(middle) < x
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        y = 0.5 * (low + high)
+        for _ in range(3):
+            y = y - (self._function(y) - x) / self._function(y, 1)
+        return 1.0 / self._function(y, 1) if derivative else y
+
+
+class _Made:
+    """Pieces in the making."""
+
+    def __init__(self, tolerance: float = TOLERANCE) -> None:
+        self.tolerance = tolerance
+        self.breaks: list[float] = []
+        self.origins: list[float] = []
+        self.rows: list[Array] = []
+        self.worst = 0.0
+
+    def add(self, left: float, origin: float, row: Array) -> None:
+        """Add a piece that starts at `left`, which does not count for the first one."""
+        if self.rows:
+            self.breaks.append(left)
+        self.origins.append(origin)
+        self.rows.append(row)
+
+    def fit(self, function: Smooth, left: float, start: float, stop: float) -> None:
+        """Add quartics that follow a function from `start` to `stop`; the first one holds from `left` on."""
+        ends = _split(function, start, stop, self.tolerance)
         for k in range(len(ends) - 1):
-            if k:
-                breaks.append(ends[k])
-            middle, row, error = _quartic(single, ends[k], ends[k + 1])
-            origins.append(middle)
-            coefficients.append(row)
-            worst = max(worst, error)
-    padded = np.zeros((len(coefficients), DEGREE + 1))
-    for k, row in enumerate(coefficients):
-        padded[k, : len(row)] = row
-    return Piecewise(
-        np.array(breaks), np.array(origins), padded, function.kind, max(function.error, worst)
-    )
+            middle, row, error = _quartic(function, ends[k], ends[k + 1])
+            self.add(ends[k] if k else left, middle, row)
+            self.worst = max(self.worst, error)
+
+    def function(self, kind: str, error: float) -> Piecewise:
+        """Return the function that the pieces make."""
+        padded = np.zeros((len(self.rows), DEGREE + 1))
+        for k, row in enumerate(self.rows):
+            padded[k, : len(row)] = row
+        return Piecewise(np.array(self.breaks), np.array(self.origins), padded, kind, max(error, self.worst))
 
 
-def _split(function: Piecewise, start: float, stop: float) -> list[float]:
+def _split(function: Smooth, start: float, stop: float, tolerance: float) -> list[float]:
     """Return ends of intervals on which quartics are close enough."""
-    if _quartic(function, start, stop)[2] <= TOLERANCE or stop - start < 1e-4:
+    if _quartic(function, start, stop)[2] <= tolerance or stop - start < 1e-4:
         return [start, stop]
     middle = 0.5 * (start + stop)
-    return _split(function, start, middle)[:-1] + _split(function, middle, stop)
+    return _split(function, start, middle, tolerance)[:-1] + _split(function, middle, stop, tolerance)
 
 
-def _quartic(function: Piecewise, start: float, stop: float) -> tuple[float, Array, float]:
+def _quartic(function: Smooth, start: float, stop: float) -> tuple[float, Array, float]:
     """Return the middle of an interval, the quartic about it (5,), and its largest difference from a function."""
     middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
     ends = np.array([start, stop])
     values, slopes = function(ends), function(ends, 1)
-    at_middle = float(function(middle))
+    at_middle = float(function(np.array([middle]))[0])
     even = 0.5 * (values[0] + values[1]) - at_middle
     odd = 0.5 * (values[1] - values[0])
     fourth = 0.25 * half * (slopes[1] - slopes[0]) - even

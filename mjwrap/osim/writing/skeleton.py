@@ -17,9 +17,15 @@ from mjwrap.osim.writing.drivers import Drivers, drivers_of
 from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
 from mjwrap.osim.writing.inertias import Written, written_inertias
 from mjwrap.osim.writing.motions import Motion, evaluated
-from mjwrap.osim.writing.piece_algebra import composed
+from mjwrap.osim.writing.piece_algebra import composed, flattened
 from mjwrap.osim.writing.rotations import quaternion
+from mjwrap.osim.writing.sites import MOST_NUMBERS
 from mjwrap.osim.writing.tree import Branch, branches_of
+
+
+# The inertia of a body that only shows a coordinate, as a share of the model's mass: the error of a coupling through it
+# grows as it gets smaller, 4e-10 s^2 times force by mass at 1 ms.
+CARRIER = 1e-5
 
 
 @dataclass(frozen=True)
@@ -42,9 +48,14 @@ class Skeleton:
 class _Writer:
     def __init__(self, document: Document, report: Report, drivers: Drivers) -> None:
         self.document, self.report, self.drivers = document, report, drivers
-        self.taken = set(drivers.coordinates)
+        self.taken = {*drivers.coordinates, *(each.joint for each in drivers.substitutes.values())}
         self.followers: list[tuple[str, float, str, Piecewise]] = []  # joint, reference, coordinate, function
         self.shown: set[str] = set()
+        self.references: dict[str, float] = {}
+        self.ranges = {name: coordinate.range for name, coordinate in drivers.coordinates.items()}
+        for name, each in drivers.substitutes.items():
+            low, high = sorted(map(float, each.motion.function(drivers.coordinates[name].range)))
+            self.ranges[each.joint] = low, high
         self.joints: list[tuple[str, Motion]] = []
 
     def name(self, wanted: str) -> str:
@@ -90,22 +101,33 @@ class _Writer:
             axis = axis * float(motion.function(0.0, 1))
             reference = drivers.value(coordinate)
             attributes.update(self.limits(drivers.coordinates[coordinate]))
+        elif coordinate in drivers.substitutes and drivers.substitutes[coordinate].motion is motion:
+            name = drivers.substitutes[coordinate].joint
+            self.shown.add(coordinate)
+            reference = motion.value(drivers.value)
+            attributes.update(self.limits(drivers.coordinates[coordinate], self.ranges[name]))
         else:
             name = self.name(f"{branch.joint.name}_{motion.name}")
             reference = motion.value(drivers.value)
             if not isinstance(motion, EllipsoidSlide):
                 self.followers.append((name, reference, coordinate, motion.function))
         self.joints.append((name, motion))
+        self.references[name] = reference
         return {"name": name, **attributes, "axis": axis, "ref": reference}
 
-    def limits(self, coordinate: Coordinate) -> dict[str, object]:
-        """Return range and limit of a coordinate's joint; what follows others, or starts outside, has no limit."""
+    def limits(
+        self, coordinate: Coordinate, image: tuple[float, float] | None = None
+    ) -> dict[str, object]:
+        """Return range and limit of a coordinate's joint; what follows others, or starts outside, has no limit.
+
+        image: the range of the joint where that is not the coordinate's.
+        """
         low, high = coordinate.range
         if not low < high:
             return {}
         limited = coordinate.clamped and coordinate.name not in self.drivers.couplers
         inside = low <= self.drivers.value(coordinate.name) <= high
-        return {"range": (low, high), "limited": limited and inside and not coordinate.locked}
+        return {"range": image or (low, high), "limited": limited and inside and not coordinate.locked}
 
     def carrier(self, coordinate: Coordinate, least: float) -> None:
         """Write a body whose only joint shows a coordinate that no axis shows."""
@@ -129,13 +151,29 @@ class _Writer:
         for joint, reference, coordinate, function in self.followers:
             self.follow(joint, reference, coordinate, function)
 
+    def functions(self) -> None:
+        """Write how coordinates that are no joint's qpos follow from one: a tuple of the joint and a numeric."""
+        for name in self.drivers.coordinates:
+            driver = self.drivers.driver(name)
+            if driver is None or driver[1] is None:
+                continue
+            data = flattened(driver[1])
+            if len(data) <= MOST_NUMBERS:
+                record = self.document.add("custom", "tuple", name=f"mjwrap_coordinate_{name}")
+                numeric = self.document.numeric(f"mjwrap_coordinate_{name}_function", data)
+                self.document.add(record, "element", objtype="joint", objname=driver[0])
+                self.document.add(record, "element", objtype="numeric", objname=numeric)
+            self.report.add("Coordinate", name, EXACT if name in self.drivers.couplers else APPROXIMATED,
+                            f"a function of joint '{driver[0]}', in {len(driver[1].origins)} pieces",
+                            driver[1].error or float("nan"), "rad or m" if driver[1].error else "")  # fmt: skip
+
     def follow(self, joint: str, reference: float, coordinate: str, function: Piecewise) -> None:
-        driver = self.drivers.driver(coordinate)
+        driver = self.drivers.driver(coordinate, precise=True)
         assert driver is not None
         leader, inner = driver
         total = function if inner is None else composed(function, inner)
-        low, high = self.drivers.coordinates[leader].range
-        at = self.drivers.value(leader)
+        at = self.drivers.value(leader) if leader in self.drivers.coordinates else self.references[leader]
+        low, high = self.ranges[leader]
         low, high = min(low, at), max(high, at)
         room = 0.1 * (high - low)
         written = write_coupling(self.document, (joint, reference), (leader, at), total, (low - room, high + room))
@@ -155,7 +193,7 @@ def write_bodies(document: Document, model: OsimModel, report: Report) -> Skelet
     for branch in branches:
         if not (branch.copy_of and branch.fixed):
             writer.body(branch, inertias[branch.body])
-    least = 1e-9 * (sum(body.mass for body in model.bodies) or 1.0)
+    least = CARRIER * (sum(body.mass for body in model.bodies) or 1.0)
     moving = {step.coordinate for branch in branches for step in branch.chain if isinstance(step, Motion)}
     needed = moving | {coupler.independent[0] for coupler in drivers.couplers.values()}
     for name, coordinate in drivers.coordinates.items():
@@ -164,4 +202,5 @@ def write_bodies(document: Document, model: OsimModel, report: Report) -> Skelet
             drivers.carriers.setdefault(name, Motion(True, np.array([1.0, 0.0, 0.0]), name, linear(1.0), ""))
             writer.shown.add(name)
     writer.couplings()
+    writer.functions()
     return Skeleton(branches, drivers, inertias, writer.joints)

@@ -1,0 +1,26 @@
+"""All of an OpenSim model but its muscles, as MJCF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from mjwrap.osim.description.model import OsimModel
+from mjwrap.osim.report import Report
+from mjwrap.osim.writing.constraints import write_constraints
+from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.options import write_options
+from mjwrap.osim.writing.skeleton import Skeleton, write_bodies
+
+
+def write_mechanics(
+    document: Document, model: OsimModel, report: Report, folders: Sequence[Path] = ()
+) -> Skeleton:
+    """Write bodies, joints, couplings, constraints, forces other than muscles, contacts, markers and meshes.
+
+    folders: where mesh files are searched, in this order.
+    """
+    write_options(document, model)
+    skeleton = write_bodies(document, model, report)
+    write_constraints(document, model, report, skeleton)
+    return skeleton
