@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import MjwrapError
 from mjwrap.mjcf import dof_names, name_of
+from mjwrap.mjcf.moving_points import is_muscle_tuple
 from mjwrap.model.takeover import Takeover
 from mjwrap.runs.excitation import Excitation
 from mjwrap.system import CableSystem, MuscleSystem
@@ -100,11 +101,12 @@ def with_native_laws(model: mujoco.MjModel) -> tuple[mujoco.MjModel, list[str]]:
             for r in rows
             if int(model.tuple_objtype[r]) == int(mujoco.mjtObj.mjOBJ_ACTUATOR)
         ]
-        if "mjwrap" not in name_of(model, mujoco.mjtObj.mjOBJ_TUPLE, i) or not actuators:
+        if not is_muscle_tuple(name_of(model, mujoco.mjtObj.mjOBJ_TUPLE, i)) or not actuators:
             continue
         if int(model.actuator_gaintype[actuators[0]]) != int(mujoco.mjtGain.mjGAIN_MUSCLE):
             continue
-        kept = [r for r in rows if int(model.tuple_objtype[r]) not in dropped]
+        ranges = [r + 1 for r in rows if int(model.tuple_objtype[r]) == int(mujoco.mjtObj.mjOBJ_JOINT)]
+        kept = [r for r in rows if int(model.tuple_objtype[r]) not in dropped or r in ranges]
         if len(kept) == len(rows):
             continue
         for field in (model.tuple_objtype, model.tuple_objid, model.tuple_objprm):

@@ -7,7 +7,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjwrap.mjcf.names import name_of
 
 MOST = 64  # alternatives of one piece of string
 _MOST_PATTERNS = 1 << 16  # combinations of joint positions that are looked at
@@ -30,6 +36,53 @@ class Presence(NamedTuple):
     def __repr__(self) -> str:
         ranges = " and ".join(f"joint {r.joint} in [{r.low:g}, {r.high:g}]" for r in self.ranges)
         return f"{'' if self.holds else 'not '}({ranges})"
+
+
+def holds(model: mujoco.MjModel, when: Sequence[Presence], qpos: NDArray[np.float64]) -> bool:
+    """Return whether a route that holds `when` points are present or absent does so at a pose qpos (nq,)."""
+
+    def inside(each: JointRange) -> bool:
+        return bool(each.low <= qpos[model.jnt_qposadr[each.joint]] <= each.high)
+
+    return all(all(map(inside, presence.ranges)) == presence.holds for presence in when)
+
+
+def routes_that_hold(
+    model: mujoco.MjModel, muscles: Sequence[Conditional], qpos: NDArray[np.float64]
+) -> dict[int, tuple[bool, ...]]:
+    """Return for every muscle with conditional points, by its place, which of its routes hold at a pose qpos (nq,)."""
+    return {
+        i: tuple(holds(model, route.when, qpos) for route in muscle.routes)
+        for i, muscle in enumerate(muscles)
+        if any(route.when for route in muscle.routes)
+    }
+
+
+def when_text(model: mujoco.MjModel, when: Sequence[Presence]) -> str:
+    """Return in words, with the joints' names, where a route holds; "" for one that always holds."""
+    words = [f"{_in_words(model, presence.ranges, presence.holds)}" for presence in when]
+    return f", where {' and '.join(words)}" if words else ""
+
+
+def _in_words(model: mujoco.MjModel, ranges: Sequence[JointRange], holding: bool) -> str:
+    parts = [
+        f"{name_of(model, mujoco.mjtObj.mjOBJ_JOINT, r.joint)} is in [{r.low:g}, {r.high:g}]" for r in ranges
+    ]
+    if holding:
+        return " and ".join(parts)
+    return parts[0].replace(" is in ", " is not in ") if len(parts) == 1 else f"not ({' and '.join(parts)})"
+
+
+class _Route(Protocol):
+    @property
+    def when(self) -> tuple[Presence, ...]: ...
+
+
+class Conditional(Protocol):
+    """A declared muscle, as far as conditional points are concerned."""
+
+    @property
+    def routes(self) -> Sequence[_Route]: ...
 
 
 class TooManyAlternatives(Exception):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from mjwrap import html
 from mjwrap.mjcf.conditional_points import Presence
+from mjwrap.mjcf.moving_points import MovingSite
 from mjwrap.muscles.activation import ActivationDynamics
 from mjwrap.muscles.laws import Law
 from mjwrap.surfaces import Surface
@@ -51,12 +52,12 @@ class Route:
     insertion: int
     weight: float = 1.0
     when: tuple[Presence, ...] = ()
-    moving: tuple[int, ...] = field(default=(), compare=False)
+    moving: tuple[MovingSite, ...] = field(default=(), compare=False)
 
     def __repr__(self) -> str:
         stops = [f"site {self.origin}", *(repr(n)[5:-1] for n in self.nodes), f"site {self.insertion}"]
         factor = f", weight {self.weight:g}" if self.weight != 1.0 else ""
-        moving = f", moving sites {', '.join(map(str, self.moving))}" if self.moving else ""
+        moving = f", moving sites {', '.join(str(each.site) for each in self.moving)}" if self.moving else ""
         when = f", when {' and '.join(map(repr, self.when))}" if self.when else ""
         return f"Route({' > '.join(stops)}{factor}{moving}{when})"
 
@@ -138,7 +139,7 @@ class MuscleDeclaration:
     @property
     def moving_sites(self) -> list[int]:
         """Ids of the sites on the path that move within their bodies as joints move."""
-        return list(dict.fromkeys(site for route in self.routes for site in route.moving))
+        return list(dict.fromkeys(each.site for route in self.routes for each in route.moving))
 
     @property
     def conditional_sites(self) -> list[int]:

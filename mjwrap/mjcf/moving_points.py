@@ -6,6 +6,7 @@ moves a joint (prm 0, 1, 2: x, y, z) and a numeric with a piecewise polynomial i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -37,9 +38,21 @@ class MovingAxis(NamedTuple):
     coefficients: Array
 
 
+class MovingSite(NamedTuple):
+    """A site that moves within its body, and the joints of which its place is a function; MuJoCo's ids."""
+
+    site: int
+    joints: tuple[int, ...]
+
+
 def is_moving_tuple(name: str) -> bool:
     """Return whether a tuple of this name declares a moving site."""
     return WORD in name
+
+
+def is_muscle_tuple(name: str) -> bool:
+    """Return whether a tuple of this name declares a muscle."""
+    return "mjwrap" in name and not is_moving_tuple(name)
 
 
 def read_moving_axes(model: mujoco.MjModel) -> list[MovingAxis]:
@@ -88,6 +101,13 @@ def _read_tuple(model: mujoco.MjModel, index: int) -> list[MovingAxis]:
             raise ModelError(f"axis {'xyz'[int(prm)]} is given twice, the second time with joint '{called}'")
         axes[int(prm)] = MovingAxis(items[0], int(prm), joint, *_read_pieces(model, numeric))
     return list(axes.values())
+
+
+def site_text(model: mujoco.MjModel, moving: Sequence[MovingSite], site: int) -> str:
+    """Return the name of a site, and the joints with which it moves if it is one of `moving`."""
+    joints = [name_of(model, OBJ.mjOBJ_JOINT, j) for each in moving if each.site == site for j in each.joints]
+    name = name_of(model, OBJ.mjOBJ_SITE, site)
+    return f"{name} (moves with {' and '.join(joints)})" if joints else name
 
 
 def check_scalar(model: mujoco.MjModel, joint: int, what: str) -> None:

@@ -10,7 +10,7 @@ from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, path_reason, pulled_tendon
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
 from mjwrap.mjcf.inside import reference_pose, shares_inside
-from mjwrap.mjcf.moving_points import is_moving_tuple, read_moving_axes
+from mjwrap.mjcf.moving_points import MovingSite, read_moving_axes
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.side_rules import choose_side_rule
@@ -60,13 +60,16 @@ def read_declarations(
                 f"the same muscle, list the actuator in the tuple"
             )
         taken.append(muscle.name)
-    moving = {axis.site for axis in read_moving_axes(model)}
+    moving: dict[int, MovingSite] = {}
+    for axis in read_moving_axes(model):
+        known = moving[axis.site].joints if axis.site in moving else ()
+        moving[axis.site] = MovingSite(axis.site, tuple(dict.fromkeys((*known, axis.joint))))
     return Declarations([_with_moving_sites(muscle, moving) for muscle in muscles + free], native, rule)
 
 
-def _with_moving_sites(muscle: MuscleDeclaration, moving: set[int]) -> MuscleDeclaration:
+def _with_moving_sites(muscle: MuscleDeclaration, moving: dict[int, MovingSite]) -> MuscleDeclaration:
     """Return a muscle whose routes say which of their sites move within their bodies."""
-    found = [tuple(dict.fromkeys(s for s in route.sites if s in moving)) for route in muscle.routes]
+    found = [tuple(moving[s] for s in dict.fromkeys(route.sites) if s in moving) for route in muscle.routes]
     if not any(found):
         return muscle
     routes = tuple(replace(route, moving=sites) for route, sites in zip(muscle.routes, found, strict=True))
@@ -85,7 +88,7 @@ def _read_tuples(
     free: list[MuscleDeclaration] = []
     for index in range(model.ntuple):
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
-        if not declares_muscle(tuple_name) or is_moving_tuple(tuple_name):
+        if not declares_muscle(tuple_name):
             continue
         muscle = read_tuple(model, rest, index, by_mujoco, side_rule)
         if muscle.actuator < 0:

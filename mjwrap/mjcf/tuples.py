@@ -163,8 +163,8 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
             pieces = kind == OBJ.mjOBJ_EQUALITY
             hint = f"; the pieces of a coupling are in a tuple '{COUPLING}JOINT'" if pieces else ""
             raise ModelError(
-                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, joint, "
-                f"numeric, or a text whose name contains one of: {listed(TEXTS)}{hint}"
+                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, "
+                f"or a text whose name contains one of: {listed(TEXTS)}{hint}"
             )
     _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
     _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)

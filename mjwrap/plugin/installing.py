@@ -25,7 +25,7 @@ from mjwrap.model.moment_columns import check_moment_columns
 from mjwrap.model.piece_table import piece_table
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
-from mjwrap.plugin.blocks.image import loaded_bodies, state_size
+from mjwrap.plugin.blocks.image import pulled_bodies, state_size
 from mjwrap.plugin.blocks.instance_muscles import read_muscles
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error
@@ -108,7 +108,7 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: in
     check_moment_columns(model, plan, muscles)
     if drawing():
         hide_tendons(spec, muscles)
-    prevent_sleep(spec, model, loaded_bodies(plan))
+    prevent_sleep(spec, model, pulled_bodies(model, plan))
     add_instance(spec, configuration_texts(names, state_size(plan), mode, rule))
     model = _compile(spec)
     if not keep_tendons:

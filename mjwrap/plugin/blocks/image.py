@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
-from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.coupling import muscle_paths, path_points
 from mjwrap.kernels.musculotendon import mujoco_muscle
 from mjwrap.kernels.musculotendon.dispatch import MUJOCO
 from mjwrap.kernels.solved import segments
@@ -41,6 +41,11 @@ def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
     ]
     ends = routes[:, [muscle_paths.R_FROM_BODY, muscle_paths.R_TO_BODY]].ravel()
     return np.unique(np.concatenate([*stops, ends]))
+
+
+def pulled_bodies(model: mujoco.MjModel, plan: Plan) -> NDArray[np.int64]:
+    """Return the ids of the bodies that the muscles of a plan can move: also those whose joints move path points."""
+    return np.union1d(loaded_bodies(plan), model.dof_bodyid[plan.uses[:, path_points.U_DOF]]).astype(np.int64)
 
 
 def state_size(plan: Plan) -> int:
