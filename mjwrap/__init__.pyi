@@ -1,5 +1,6 @@
 """The public names, each with the module that it comes from: what `mjwrap.NAME` loads, and what type checkers read."""
 
+from . import osim as osim
 from .calibration import FiberFit as FiberFit
 from .calibration import Finding as Finding
 from .calibration import HillFit as HillFit

@@ -8,6 +8,9 @@ import mujoco
 import numpy as np
 from numpy.polynomial import Polynomial
 
+import mjwrap as mw
+from mjwrap.mjcf.couplings import CoupledJoints
+
 Array = np.ndarray
 
 
@@ -36,6 +39,31 @@ class Spline:
             step = Polynomial([-knot, 1.0]) ** 3 * (rng.uniform(-size, size) / width**3)
             pieces.append(pieces[-1] + step)
         return cls(knots, pieces)
+
+    @classmethod
+    def through(cls, x: Array, y: Array) -> Spline:
+        """Return the natural cubic spline through points, which goes on linearly outside."""
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        h, slope = np.diff(x), np.diff(y) / np.diff(x)
+        matrix, right = np.eye(len(x)), np.zeros(len(x))
+        for i in range(1, len(x) - 1):
+            matrix[i, i - 1 : i + 2] = h[i - 1], 2.0 * (h[i - 1] + h[i]), h[i]
+            right[i] = 6.0 * (slope[i] - slope[i - 1])
+        bend = np.linalg.solve(matrix, right)
+        pieces = []
+        for i, start in enumerate(x[:-1]):
+            c = [
+                y[i],
+                slope[i] - h[i] * (2 * bend[i] + bend[i + 1]) / 6,
+                bend[i] / 2,
+                (bend[i + 1] - bend[i]) / (6 * h[i]),
+            ]
+            pieces.append(Polynomial(c)(Polynomial([-start, 1.0])))
+        ends = [
+            Polynomial([p(at) - at * p.deriv()(at), p.deriv()(at)])
+            for p, at in ((pieces[0], x[0]), (pieces[-1], x[-1]))
+        ]
+        return cls(x, [ends[0], *pieces, ends[1]])
 
     def piece(self, x: float) -> int:
         """Return the number of the piece that holds at x."""
@@ -125,6 +153,16 @@ MUSCLE = (
 )
 
 
+def gait_knee(timestep: float, integrator: str) -> Knee:
+    """Return a knee whose shank slides like that of the models of human gait: some centimetres, over 11 and 6 knots."""
+    angle = np.radians([-120, -100, -80, -60, -40, -20, -10, 11, 20, 28, 90])
+    x = [-0.003, 0.002, 0.004, 0.004, 0.002, -0.001, -0.003, -0.005, -0.0055, -0.0056, -0.0055]
+    coarse = np.radians([-120, -70, -30, -20, -10, 90])
+    z = [-0.028, -0.013, -0.004, -0.0026, -0.0016, -0.001]
+    given = {"slide_x": Spline.through(angle, x), "slide_z": Spline.through(coarse, z)}
+    return knee(1, timestep, integrator, given=given)
+
+
 @dataclass
 class Knee:
     """The model, and the splines of its couplings by follower: what they depend on is in `leaders`."""
@@ -161,6 +199,7 @@ def knee(
     muscle: bool = False,
     floor: bool = False,
     wheel: bool = True,
+    given: dict[str, Spline] | None = None,
     counts: tuple[int, ...] = (9, 12, 7, 8, 10),
     size: float = 0.02,
 ) -> Knee:
@@ -172,6 +211,7 @@ def knee(
         "slide_z": Spline.random(rng, size, -2.0, 0.5, counts[1]),
         "twist": Spline.random(rng, 5 * size, -2.0, 0.5, counts[2]),
     }
+    splines |= given or {}
     z = splines["slide_z"]
     reach = [z(x) for x in np.linspace(-2.0, 0.5, 60)]
     splines["glide"] = Spline.random(rng, size, min(reach), max(reach), counts[3])
@@ -198,3 +238,18 @@ def knee(
         equalities="".join(part[0] for part in parts), custom="".join(part[1] for part in parts),
     )  # fmt: skip
     return Knee(xml, splines, leaders)
+
+
+def installed(made: Knee) -> mujoco.MjModel:
+    return mw.install(mujoco.MjSpec.from_string(made.xml))
+
+
+def start(made: Knee, model: mujoco.MjModel, seed: int = 0) -> mujoco.MjData:
+    """Return data at the default pose, with the leaders moving fast and the followers with them."""
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    couplings = CoupledJoints(made.model)
+    k = len(couplings.independent)
+    speed = rng.uniform(-3.0, 3.0, k)
+    speed[list(couplings.independent).index(int(model.joint("knee").dofadr[0]))] = rng.choice([-6.0, 6.0])
+    data.qvel[:] = couplings.matrix(data.qpos) @ speed
+    return data
