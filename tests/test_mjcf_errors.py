@@ -63,7 +63,7 @@ ROUTES = {
         ["site 'via'", "not geom 'elbow' with a hint", SURFACES],
     ),
     "box": ([ORIGIN, element("geom", "crate"), INSERTION], ["geom 'crate'", "of type box", SURFACES]),
-    "strange prm": ([ORIGIN, element("site", "via", 2), INSERTION], ["site 'via'", "prm=2", "1 the hint"]),
+    "strange prm": ([ORIGIN, element("site", "via", 3), INSERTION], ["site 'via'", "prm=3", "1 the hint"]),
 }
 
 

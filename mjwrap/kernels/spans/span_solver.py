@@ -243,6 +243,19 @@ def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
     return status, total, error, iterations, evaluations
 
 
+@deferred(types.int64, types.float64, types.float64, types.int64, types.int64)
+def _solve_without_hints(lo, hi, ends, node, tol, direct):
+    """Search once more from a cold start that ignores the hints of surfaces without a closed form.
+
+    On the allowed side of such a surface a path may be about to slip off, where no search ends.
+    """
+    forget(lo, hi, node)
+    for k in range(lo, hi):
+        if not closed_form(k, node):
+            node[k, lay.HINT] = -abs(node[k, lay.HINT])
+    return solve_active_set(lo, hi, ends, node, tol, direct)
+
+
 @jit
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
@@ -285,6 +298,10 @@ def solve_span(lo, hi, ends, node, tol, direct):
             status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error, True)
             iterations += i
             evaluations += e
+    if held and not warm and (status == lay.NOT_CONVERGED or status == lay.NOT_MINIMAL):
+        status, total, error, i, e = _solve_without_hints(lo, hi, ends, node, tol, direct)
+        iterations += i
+        evaluations += e
     if status == lay.ENDPOINT_INSIDE:
         if warm:
             restore_solutions(lo, hi, ends, node, W_OLD)
