@@ -1,5 +1,6 @@
 """The public names, each with the module that it comes from: what `mjwrap.NAME` loads, and what type checkers read."""
 
+from . import osim as osim
 from .calibration import FiberFit as FiberFit
 from .calibration import Finding as Finding
 from .calibration import HillFit as HillFit
@@ -51,6 +52,8 @@ from .muscles.bench import simulate_muscle as simulate_muscle
 from .muscles.energetics import Energetics as Energetics
 from .muscles.energetics import Umberger2010 as Umberger2010
 from .muscles.energetics import basal_power as basal_power
+from .osim.importing import Imported as Imported
+from .osim.importing import import_osim as import_osim
 from .paths import Contact as Contact
 from .paths import Obstacle as Obstacle
 from .paths import PathSolution as PathSolution

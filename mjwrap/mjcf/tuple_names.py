@@ -1,10 +1,13 @@
-"""Tell by its name what a `<custom>` tuple declares: a muscle, the pieces of a coupling, or a point that moves."""
+"""Tell by its name what a `<custom>` tuple declares: a muscle, a coupling, a moving point, or a coordinate."""
 
 from __future__ import annotations
 
 OURS = "mjwrap"  # in the names of all tuples that mjwrap reads
 COUPLING = "mjwrap_coupling_"  # pieces of a coupling of joints (`coupling_pieces.py`)
 MOVING = "mjwrap_moving_"  # a site that moves in its body's frame
+
+COORDINATE = "mjwrap_coordinate_"  # a coordinate of an OpenSim model that is a function of a joint
+_OTHERS = COUPLING, MOVING, COORDINATE
 
 
 def is_ours(name: str) -> bool:
@@ -14,7 +17,7 @@ def is_ours(name: str) -> bool:
 
 def declares_muscle(name: str) -> bool:
     """Return whether a tuple of this name declares a muscle."""
-    return is_ours(name) and COUPLING not in name and MOVING not in name
+    return is_ours(name) and not any(word in name for word in _OTHERS)
 
 
 def declares_coupling(name: str) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -12,17 +14,17 @@ from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathS
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.reading.model import read_osim
 from mjwrap.osim.report import Report
-from mjwrap.osim.writing.constraints import write_constraints
 from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.mechanics import write_mechanics
 from mjwrap.osim.writing.muscles import MuscleWriter
-from mjwrap.osim.writing.options import write_options
 from mjwrap.osim.writing.routes import RouteWriter
 from mjwrap.osim.writing.sampled_poses import sampled_poses
 from mjwrap.osim.writing.sites import SiteWriter
-from mjwrap.osim.writing.skeleton import Skeleton, write_bodies
+from mjwrap.osim.writing.skeleton import Skeleton
 from mjwrap.osim.writing.unique_names import UniqueNames
 from mjwrap.osim.writing.wraps import write_wrap
 
+MESH_FOLDERS = ("", "Geometry")  # beside the file
 MESH_SUFFIXES = (".obj", ".stl", ".msh", ".png")
 
 
@@ -64,11 +66,14 @@ class Imported(NamedTuple):
             raise
 
 
-def import_osim(path: str | os.PathLike[str], *, poses: int = 60) -> Imported:
+def import_osim(
+    path: str | os.PathLike[str], *, meshes: Sequence[str | os.PathLike[str]] = (), poses: int = 60
+) -> Imported:
     """Import an OpenSim model (.osim) as a MuJoCo model with geodesic muscles.
 
     Args:
         path: the file.
+        meshes: folders in which its mesh files are searched first; then the file's own folder and its Geometry are.
         poses: number of poses within the coordinates' ranges at which the places of wrap objects on their paths are
             chosen.
 
@@ -80,9 +85,8 @@ def import_osim(path: str | os.PathLike[str], *, poses: int = 60) -> Imported:
     """
     model = read_osim(path)
     document, report = Document(model.name), Report(model.name, model.version)
-    write_options(document, model)
-    skeleton = write_bodies(document, model, report)
-    write_constraints(document, model, report, skeleton)
+    folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]
+    skeleton = write_mechanics(document, model, report, folders)
     write_paths(document, model, report, skeleton, poses)
     xml = document.to_xml()
     spec = mujoco.MjSpec.from_string(xml, assets=document.assets)

@@ -144,10 +144,7 @@ def length_curves(law, x):
 def velocity_force(law, activation, v):
     """Return the force-velocity curve at v [v_max l_o], and its slopes in v and in activation."""
     if law >= LEAST_ADDRESS:
-        scale, growth = own_curves.speed_scale(law, activation)
-        force, slope = own_curves.velocity_curve(law, v / scale)
-        slope /= scale
-        return force, slope, -slope * v * growth / scale
+        return own_curves.velocity_force(law, activation, v)
     force, slope = velocity_curve(law, v)
     return force, slope, 0.0
 
@@ -201,10 +198,7 @@ def balancing_velocity_force(law, activation, strength, damping, wanted, close):
     Arguments as of `law_balancing_velocity`.
     """
     if law >= LEAST_ADDRESS:
-        scale, growth = own_curves.speed_scale(law, activation)
-        w, force, slope = own_curves.balancing_velocity(law, strength, damping * scale, wanted, close)
-        slope /= scale
-        return w * scale, force, slope, -slope * w * growth
+        return own_curves.balancing_velocity_force(law, activation, strength, damping, wanted, close)
     v, force, slope = law_balancing_velocity(law, strength, damping, wanted, close)
     return v, force, slope, 0.0
 

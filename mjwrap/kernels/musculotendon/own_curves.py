@@ -16,7 +16,8 @@ KIND, LONGEST_START = 0, 1
 ACTIVE, VELOCITY, PASSIVE, TENDON = range(2, 6)  # addresses of the tables
 BEZIER_SIZE = 6
 BEZIER, THELEN = 1.0, 2.0  # kinds
-MAX_VELOCITY = 100.0  # [v_max l_o] bound of the fibre velocity, where no force limits it
+# bound of w: the caller's bound of the fibre velocity is 100 v_max l_o, and Thelen's least `speed_scale` 0.25
+MAX_VELOCITY = 400.0
 MAX_STEPS = 80  # most Newton steps and bisections for a velocity; three or four are normal
 
 
@@ -48,7 +49,16 @@ def velocity_curve(h, w):
     return evaluate(int(read(h, VELOCITY)), w)
 
 
-@jit
+@no_inline
+def velocity_force(h, activation, v):
+    """Return the force-velocity curve at v [v_max l_o] and an activation, and its slopes in both."""
+    scale, growth = speed_scale(h, activation)
+    force, slope = velocity_curve(h, v / scale)
+    slope /= scale
+    return force, slope, -slope * v * growth / scale
+
+
+@no_inline
 def inverse_velocity(h, force):
     """Return the velocity, by `speed_scale`, at which the force-velocity curve has a value."""
     if read(h, KIND) == THELEN:
@@ -69,6 +79,7 @@ def balancing_velocity(h, strength, damping, wanted, close):
             w = thelen.inverse_velocity(h, force)
         else:
             w = bezier_tables.near_inverse(int(read(h, VELOCITY)), force)
+        w = min(max(w, low), high)
         if damping > 0.0:
             held, _ = velocity_curve(h, w)
             steepness = (held - 1.0) / w if abs(w) > 1e-3 else velocity_curve(h, 0.0)[1]
@@ -96,6 +107,15 @@ def balancing_velocity(h, strength, damping, wanted, close):
 
 
 @no_inline
+def balancing_velocity_force(h, activation, strength, damping, wanted, close):
+    """Return v [v_max l_o] with strength f_v(v) + damping v = wanted, f_v, and its slopes in v and activation."""
+    scale, growth = speed_scale(h, activation)
+    w, force, slope = balancing_velocity(h, strength, damping * scale, wanted, close)
+    slope /= scale
+    return w * scale, force, slope, -slope * w * growth
+
+
+@no_inline
 def tendon_curve(h, x):
     """Return the tendon's force [F_max] and its slope at tendon length x [l_s], above one."""
     if read(h, KIND) == THELEN:
@@ -103,7 +123,7 @@ def tendon_curve(h, x):
     return evaluate(int(read(h, TENDON)), x)
 
 
-@jit
+@no_inline
 def passive_energy(h, x):
     """Return the energy of the parallel elastic element [F_max l_o] at fibre length x [l_o]."""
     if read(h, KIND) == THELEN:
@@ -111,7 +131,7 @@ def passive_energy(h, x):
     return bezier_tables.integral(int(read(h, PASSIVE)), x)
 
 
-@jit
+@no_inline
 def tendon_energy(h, x):
     """Return the energy of the tendon [F_max l_s] at its length x [l_s], above one."""
     if read(h, KIND) == THELEN:

@@ -8,7 +8,12 @@ from pathlib import Path
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.report import Report
 from mjwrap.osim.writing.constraints import write_constraints
+from mjwrap.osim.writing.contacts import write_contacts
 from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.generalized_forces import write_generalized_forces
+from mjwrap.osim.writing.inertia_report import report_inertias
+from mjwrap.osim.writing.markers import write_markers
+from mjwrap.osim.writing.meshes import write_meshes
 from mjwrap.osim.writing.options import write_options
 from mjwrap.osim.writing.skeleton import Skeleton, write_bodies
 
@@ -23,4 +28,9 @@ def write_mechanics(
     write_options(document, model)
     skeleton = write_bodies(document, model, report)
     write_constraints(document, model, report, skeleton)
+    report_inertias(document, report, skeleton)
+    write_generalized_forces(document, model, report, skeleton)
+    write_markers(document, model, report)
+    write_meshes(document, model, report, folders)
+    write_contacts(document, model, report, skeleton, folders)
     return skeleton

@@ -13,5 +13,5 @@ def write_options(document: Document, model: OsimModel) -> None:
         {"angle": "radian", "autolimits": "true", "inertiafromgeom": "false"}
     )
     option = document.section("option").attrib
-    option.update({"timestep": repr(TIMESTEP), "integrator": "implicitfast"})
+    option.update({"timestep": repr(TIMESTEP), "integrator": "RK4"})
     option["gravity"] = " ".join(repr(float(part)) for part in model.gravity)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from mjwrap.osim.description.paths import Path
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.segment_scan import Sample
-from mjwrap.osim.writing.segments import Seat, in_order, seat_wraps
+from mjwrap.osim.writing.segments import Seat, seat_wraps
 from mjwrap.osim.writing.sites import Elements, SiteWriter
+from mjwrap.osim.writing.wrap_order import in_order
 from mjwrap.osim.writing.wraps import WrittenWrap
 
 
@@ -40,8 +41,10 @@ class RouteWriter:
         elements: Elements = []
         for gap, stop in enumerate(stops):
             elements += stop.elements
-            for seat in in_order(seats, gap):
+            for seat in in_order(path, seats, gap, self._wraps, self._poses):
                 elements += self._wraps[seat.wrap].elements
+        for seat in seats:
+            self._report_seat(f"{owner}/{seat.wrap}", path, seat)
         return Route(elements, [stop.site for stop in stops if stop.always])
 
     def _seats(self, owner: str, path: Path) -> list[Seat]:
@@ -60,7 +63,6 @@ class RouteWriter:
                 self._report.add("PathWrap", name, LEFT_OUT, reason)
                 continue
             kept.append(seat)
-            self._report_seat(name, path, seat)
         return kept
 
     def _report_seat(self, name: str, path: Path, seat: Seat) -> None:
@@ -70,13 +72,14 @@ class RouteWriter:
         remarks = [
             (seat.missed, "on another segment at {:.1%}, which is not kept"),
             (seat.moved * (len(seat.gaps) > 1), "it moves from one segment to another, at {:.1%}"),
+            (seat.turned, "in another order with the other surfaces of its segment at {:.1%}"),
             (seat.several, "it meets several segments at {:.1%}, and OpenSim wraps the first"),
             (seat.inside, "an end of its segment is inside it at {:.1%}, where OpenSim does not wrap it"),
             (seat.beyond, "the path meets it only beyond the ends of the cylinder at {:.1%}, where OpenSim does not "
                           "wrap it and mjwrap does"),
         ]  # fmt: skip
         said = [remark.format(share) for share, remark in remarks if share > 0.0]
-        outcome = APPROXIMATED if max(seat.missed, seat.inside, seat.beyond) > 0.0 else EXACT
+        outcome = APPROXIMATED if max(seat.missed, seat.inside, seat.beyond, seat.turned) > 0.0 else EXACT
         size = seat.error if max(seat.missed, seat.beyond) > 0.0 else float("nan")
         self._report.add("PathWrap", name, outcome, "; ".join([text, *said]), size, "m" * (size == size))
 

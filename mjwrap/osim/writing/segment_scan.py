@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,7 @@ class Act(NamedTuple):
     along: float
     inside: bool
     beyond: bool
+    contact: tuple[Array, Array] | None = None
 
 
 def active_points(path: Path, sample: Sample) -> list[int]:
@@ -58,12 +59,22 @@ def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, sample: Sample) ->
         for k in there
     }
     return [
-        _act(written, first, last, places[first], places[last])
+        act_between(written, first, last, places[first], places[last])
         for first, last in zip(there, there[1:], strict=False)
     ]
 
 
-def _act(written: WrittenWrap, first: int, last: int, start: Array, end: Array) -> Act:
+def best_act(acts: Sequence[Act]) -> Act | None:
+    """Return the segment on which OpenSim's wrap acts: the first one hit, else the one lengthened least."""
+    touched = [act for act in acts if act.touched and not act.inside]
+    hit = [act for act in touched if act.hit]
+    if hit:
+        return hit[0]
+    return min(touched, key=lambda act: act.added, default=None)
+
+
+def act_between(written: WrittenWrap, first: int, last: int, start: Array, end: Array) -> Act:
+    """Return what a wrap does on the segment between two points (3,) in the wrap's frame."""
     wrap = written.wrap
     depth, along = _deepest(wrap, start, end)
     inside = min(_height(wrap, start[None])[0], _height(wrap, end[None])[0]) < -ON_SURFACE
@@ -81,7 +92,7 @@ def _act(written: WrittenWrap, first: int, last: int, start: Array, end: Array) 
     along = float(straight @ (0.5 * (contact.P + contact.Q) - start) / (straight @ straight))
     beyond = wrap.kind == "WrapCylinder" and min(abs(contact.P[2]), abs(contact.Q[2])) > 0.5 * wrap.dimensions[1]
     added = solution.length - float(np.linalg.norm(straight))
-    return Act(first, last, hit, not beyond, added, along, inside, beyond)
+    return Act(first, last, hit, not beyond, added, along, inside, beyond, (contact.P, contact.Q))
 
 
 def _height(wrap: WrapObject, points: Array) -> Array:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mjwrap.osim.description.paths import Path
-from mjwrap.osim.writing.segment_scan import Act, Sample, acts_of
+from mjwrap.osim.writing.segment_scan import Act, Sample, acts_of, best_act
 from mjwrap.osim.writing.wraps import WrittenWrap
 
 
@@ -38,6 +38,7 @@ class Seat:
     inside: float = 0.0
     beyond: float = 0.0
     error: float = 0.0
+    turned: float = 0.0  # it comes before one that is listed later (`wrap_order.py`)
     along: dict[int, float] = field(default_factory=dict)  # gap -> mean place on the segment, 0 to 1
 
 
@@ -46,16 +47,11 @@ def seat_wraps(path: Path, wraps: Mapping[str, WrittenWrap], poses: Sequence[Sam
     return [_seat(path, k, wraps[wrap.object], poses) for k, wrap in enumerate(path.wraps) if wrap.object in wraps]
 
 
-def in_order(seats: Sequence[Seat], gap: int) -> list[Seat]:
-    """Return the seats on a gap in the order of the path."""
-    return sorted((seat for seat in seats if gap in seat.gaps), key=lambda seat: seat.along.get(gap, 0.5))
-
-
 def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Sample]) -> Seat:
     wrap = path.wraps[index]
     seat = Seat(wrap.object)
     scans = [acts_of(path, wrap, written, pose) for pose in poses]
-    chosen = [_best(acts) for acts in scans]
+    chosen = [best_act(acts) for acts in scans]
     acting = [act for act in chosen if act is not None]
     total = max(len(poses), 1)
     seat.acted = len(acting) / total
@@ -77,15 +73,6 @@ def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Sample])
 
 def _lies_in(act: Act, gaps: Sequence[int]) -> bool:
     return any(act.first <= gap < act.last for gap in gaps)
-
-
-def _best(acts: Sequence[Act]) -> Act | None:
-    """Return the segment on which OpenSim's wrap acts: the first one hit, else the one lengthened least."""
-    touched = [act for act in acts if act.touched and not act.inside]
-    hit = [act for act in touched if act.hit]
-    if hit:
-        return hit[0]
-    return min(touched, key=lambda act: act.added, default=None)
 
 
 def _covering(acting: Sequence[Act], several: bool) -> list[int]:
