@@ -29,7 +29,10 @@ HILL = {"max_isometric_force": 60.0, "optimal_fiber_length": 0.1, "tendon_slack_
 ELASTIC = {**HILL, "tendon_model": "elastic", "pennation_angle": 0.2}
 LIGAMENT = (2, 1.05, 1.0, 1.05, 0.0, 0.0, 10.0, 0.0, 0.025, 1.0, 5.0, 0.0)
 DECLARED: dict[str, tuple[str, dict[str, Any]]] = {
-    "thelen": ("thelen_2003", ELASTIC | {"max_tendon_strain": 0.033, "active_shape": 0.5, "passive_shape": 4.0}),
+    "thelen": (
+        "thelen_2003",
+        ELASTIC | {"max_tendon_strain": 0.033, "active_shape": 0.5, "passive_shape": 4.0},
+    ),
     "thelen_rigid": ("thelen_2003", HILL | {"minimum_activation": 0.02, "max_pennation": 1.3}),
     "shaped": ("millard_2012", ELASTIC | OWN_CURVES | {"minimum_activation": 0.01}),
     "undamped": ("millard_2012", ELASTIC | {"fiber_damping": 0.0}),
@@ -114,26 +117,60 @@ def test_an_activation_does_not_fall_below_the_least() -> None:
     ("law", "given", "words"),
     [
         ("thelen_2003", HILL | {"max_lengthening_force": 1.0}, "max_lengthening_force must be above 1"),
-        ("thelen_2003", HILL | {"velocity_extrapolation": 0.5}, "velocity_extrapolation must be above 0.714285714"),
+        (
+            "thelen_2003",
+            HILL | {"velocity_extrapolation": 0.5},
+            "velocity_extrapolation must be above 0.714285714",
+        ),
         ("thelen_2003", HILL | {"max_tendon_strain": -0.1}, "max_tendon_strain must be finite and positive"),
         ("millard_2012", HILL | {"minimum_activation": 1.0}, r"minimum_activation must be in \[0, 1\)"),
         ("millard_2012", HILL | {"max_pennation": 2.0}, "max_pennation must be in"),
         ("millard_2012", HILL | {"pennation_angle": 0.5, "max_pennation": 0.4}, "max_pennation must be in"),
-        ("millard_2012", HILL | {"tendon_force_length_curve": (0.0,)}, "strain_at_one_norm_force must be above 0"),
-        ("millard_2012", HILL | {"tendon_force_length_curve": (0.05, 10.0, 0.5, 0.5)}, "stiffness_at_one_norm_force"),
-        ("millard_2012", HILL | {"fiber_force_length_curve": (0.0, 0.7, 3.0, 4.0, 0.5)}, "stiffness_at_low_force"),
+        (
+            "millard_2012",
+            HILL | {"tendon_force_length_curve": (0.0,)},
+            "strain_at_one_norm_force must be above 0",
+        ),
+        (
+            "millard_2012",
+            HILL | {"tendon_force_length_curve": (0.05, 10.0, 0.5, 0.5)},
+            "stiffness_at_one_norm_force",
+        ),
+        (
+            "millard_2012",
+            HILL | {"fiber_force_length_curve": (0.0, 0.7, 3.0, 4.0, 0.5)},
+            "stiffness_at_low_force",
+        ),
         ("millard_2012", HILL | {"fiber_force_length_curve": (0.0, 0.7, 0.2)}, "2 or 5 numbers"),
-        ("millard_2012", HILL | {"active_force_length_curve": (0.8, 0.7, 1.8, 0.8, 0.0)}, "transition_norm_fiber"),
-        ("millard_2012", HILL | {"force_velocity_curve": (0, 0.25, 0.9, 0, 0.15, 1.4, 0.6, 0.9)}, "isometric_slope"),
-        ("millard_2012", HILL | {"force_velocity_curve": (0, 0.25, 5, 0, 0.15, 1.4, 0.6, 1.9)}, "eccentric_curviness"),
+        (
+            "millard_2012",
+            HILL | {"active_force_length_curve": (0.8, 0.7, 1.8, 0.8, 0.0)},
+            "transition_norm_fiber",
+        ),
+        (
+            "millard_2012",
+            HILL | {"force_velocity_curve": (0, 0.25, 0.9, 0, 0.15, 1.4, 0.6, 0.9)},
+            "isometric_slope",
+        ),
+        (
+            "millard_2012",
+            HILL | {"force_velocity_curve": (0, 0.25, 5, 0, 0.15, 1.4, 0.6, 1.9)},
+            "eccentric_curviness",
+        ),
         ("path_spring", {"stiffness": 1.0}, "needs resting_length"),
-        ("ligament", {"pcsa_force": 1.0, "resting_length": 0.1, "ligament_curve": (1,)}, "number P of pieces"),
+        (
+            "ligament",
+            {"pcsa_force": 1.0, "resting_length": 0.1, "ligament_curve": (1,)},
+            "number P of pieces",
+        ),
     ],
 )
 def test_unphysical_parameters_are_refused_by_name(law: str, given: dict[str, Any], words: str) -> None:
     model = mujoco.MjModel.from_xml_string(XML)
     with pytest.raises(mw.ModelError, match=words):
-        mw.muscle_xml(model, "m", "a, to", law=law, parameters=given, driven=law in ("thelen_2003", "millard_2012"))
+        mw.muscle_xml(
+            model, "m", "a, to", law=law, parameters=given, driven=law in ("thelen_2003", "millard_2012")
+        )
 
 
 @pytest.mark.parametrize("name", PASSIVE)

@@ -13,34 +13,29 @@ import mjwrap as mw
 from mjwrap.kernels.musculotendon import dispatch, tension
 from mjwrap.muscles.energetics import Energetics, compute_energetics, metabolic_constants
 
-# OpenSim 4.6's SimmSpline through (0, 0), (1, 0.05), (1.1, 0.3), (1.2, 1) times 200 N, resting length 0.1 m: pieces
-# from its knots, straight outside, and what its Ligament says at five lengths [m]
-KNOTS = ((0.0, 0.0), (1.0, 0.05), (1.1, 0.3), (1.2, 1.0))
-PULLS = {0.09: 0.0, 0.1: 0.0, 0.100001: 10.001176106215508, 0.115: 117.48295454545439, 0.12: 200.0, 0.13: 391.75757575757615}
+# OpenSim 4.6's SimmSpline through (0, 0), (1, 0.05), (1.1, 0.3), (1.2, 1): x, value and slope at its last three knots,
+# and what its Ligament of 200 N and a resting length of 0.1 m says at lengths [m].
+KNOTS = ((1.0, 0.05, 0.587878787878779), (1.1, 0.3, 4.581060606060612), (1.2, 1.0, 9.5878787878788))
+PULLS = {
+    0.09: 0.0,
+    0.1: 0.0,
+    0.100001: 10.001176106215508,
+    0.115: 117.48295454545439,
+    0.12: 200.0,
+    0.13: 391.75757575757615,
+}
 # A curve that dips below zero and rises: x^3 - x^2 about 1, then a straight line.
 DIP = (2, 1.5, 1.0, 1.5, 0.0, 0.0, -1.0, 4.0, 0.25, 2.0, 0.0, 0.0)
 
 
 def spline() -> mw.Ligament:
-    """Return a ligament with the pieces of that spline, whose coefficients follow from its values in OpenSim."""
-    from scipy.interpolate import PPoly
-
-    # slopes and curvatures that make a cubic through OpenSim's own values (see its pull at 0.100001 and 0.115 m)
-    x = np.array([k[0] for k in KNOTS])
-    y = np.array([k[1] for k in KNOTS])
-    end = (PULLS[0.13] / 200.0 - 1.0) / 0.1
-    start = (PULLS[0.100001] / 200.0 - 0.05) / 1e-5
-    middle = 0.3
-    rows_of = []
-    # middle slope from the value at x = 1.15, a Hermite cubic between 1.1 and 1.2
-    h = 0.1
-    middle = 8.0 / h * (PULLS[0.115] / 200.0 - 0.5 * (y[2] + y[3])) + end
-    for k, (low, high) in enumerate(((start, middle), (middle, end))):
-        i, d = k + 1, (y[k + 2] - y[k + 1]) / h
-        rows_of.append([y[i], low, (3.0 * d - 2.0 * low - high) / h, (low + high - 2.0 * d) / h**2])
-    assert PPoly is not None
-    pieces = [*rows_of, [1.0, end, 0.0, 0.0]]
-    numbers = [3.0, 1.1, 1.2, 1.0, 1.1, 1.2, *(c for row in pieces for c in row)]
+    """Return a ligament with the pieces of that spline: cubic between two knots, straight after the last."""
+    pieces = []
+    for (x, y, low), (end, top, high) in zip(KNOTS, KNOTS[1:], strict=False):
+        h, d = end - x, (top - y) / (end - x)
+        pieces.append([y, low, (3.0 * d - 2.0 * low - high) / h, (low + high - 2.0 * d) / h**2])
+    pieces.append([KNOTS[2][1], KNOTS[2][2], 0.0, 0.0])
+    numbers = [3.0, 1.1, 1.2, 1.0, 1.1, 1.2, *(c for piece in pieces for c in piece)]
     return mw.Ligament(200.0, 0.1, numbers)
 
 
@@ -96,7 +91,9 @@ def test_a_spring_pulls_as_opensim_says_and_never_pushes() -> None:
         assert pull(law, length, speed) == pytest.approx(wanted, rel=1e-12, abs=1e-14)
 
 
-@pytest.mark.parametrize("law", [mw.PathSpring(300.0, 0.1, 0.5), mw.Ligament(50.0, 0.09, DIP)], ids=["spring", "ligament"])
+@pytest.mark.parametrize(
+    "law", [mw.PathSpring(300.0, 0.1, 0.5), mw.Ligament(50.0, 0.09, DIP)], ids=["spring", "ligament"]
+)
 def test_power_is_that_of_the_energy_and_of_the_damping(law: Any) -> None:
     rng = np.random.default_rng(1)
     length, speed = rng.uniform(0.08, 0.2, 200), rng.uniform(-4.0, 4.0, 200)
@@ -107,7 +104,9 @@ def test_power_is_that_of_the_energy_and_of_the_damping(law: Any) -> None:
     assert np.array_equal(e.fiber_power, e.damping_power)
     assert (e.damping_power <= 1e-12).all()
     h = 1e-6
-    slope = (books(law, length + h, speed).tendon_energy - books(law, length - h, speed).tendon_energy) / (2.0 * h)
+    slope = (books(law, length + h, speed).tendon_energy - books(law, length - h, speed).tendon_energy) / (
+        2.0 * h
+    )
     assert e.tendon_power == pytest.approx(-slope * speed, abs=1e-4)
     assert np.ptp(e.tendon_energy) > 0.01
     assert not np.any([e.fiber_energy, e.active_power, e.unbalanced_power, e.metabolic_power])
