@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
-from mjwrap.osim.description.functions import Array, Piecewise
+from mjwrap.osim.description.functions import Array, Piecewise, linear
+from mjwrap.osim.writing.piece_algebra import shifted
 
 DEGREE = 4
 TOLERANCE = 1e-10  # [rad or m] of an approximated piece
+IDENTITY = linear(1.0)
 
 
 def quartic_pieces(function: Piecewise, low: float, high: float) -> Piecewise:
@@ -35,13 +38,20 @@ def quartic_pieces(function: Piecewise, low: float, high: float) -> Piecewise:
 
 
 def inverse_pieces(
-    function: Piecewise, low: float, high: float, tolerance: float = TOLERANCE
+    function: Piecewise,
+    low: float,
+    high: float,
+    tolerance: float = TOLERANCE,
+    outer: Piecewise = IDENTITY,
 ) -> Piecewise | None:
     """Return the inverse of a function that rises, or falls, from `low` to `high`; None where it does neither.
 
-    Straight lines are inverted exactly. Beyond the values at `low` and `high` the last pieces go on.
+    With `outer`, another function of the same variable, return outer(inverse).
+
+    Straight lines are inverted exactly, and the rest within the tolerance. Beyond the values at `low` and `high` the last pieces go on.
     """
-    breaks = function.breaks[(function.breaks > low) & (function.breaks < high)]
+    breaks = np.union1d(function.breaks, outer.breaks)
+    breaks = breaks[(breaks > low) & (breaks < high)]
     knots = np.concatenate([[low], breaks, [high]])
     slopes = function(np.concatenate([np.linspace(a, b, 50) for a, b in zip(knots[:-1], knots[1:], strict=True)]), 1)
     if slopes.max() * slopes.min() <= 0.0 or np.abs(slopes).min() < 1e-3 * np.abs(slopes).max():
@@ -53,13 +63,14 @@ def inverse_pieces(
         middle = 0.5 * (knots[k] + knots[k + 1])
         piece = int(function.piece(middle))
         row, origin = function.coefficients[piece], float(function.origins[piece])
+        over = int(outer.piece(middle))
+        wide = shifted(outer, over, origin, outer.coefficients.shape[1])
         start, stop = float(function(knots[k])), float(function(knots[k + 1]))
         left = start if k else -np.inf
-        if row[2:].any():
-            single = Piecewise(np.zeros(0), function.origins[piece : piece + 1], row[None])
-            made.fit(_Inverse(single, float(knots[k]), float(knots[k + 1])), left, start, stop)
+        if row[2:].any() or wide[DEGREE + 1 :].any():
+            made.fit(_Inverse(row, wide, float(knots[k]) - origin, float(knots[k + 1]) - origin), left, start, stop)
         else:
-            made.add(left, float(row[0]), np.array([origin, 1.0 / row[1]]))
+            made.add(left, float(row[0]), wide / row[1] ** np.arange(len(wide)))
     return made.function(function.kind, 0.0)
 
 
@@ -72,22 +83,23 @@ class Smooth(Protocol):
 
 
 class _Inverse:
-    """The inverse of a function between two points, by bisection and Newton's method."""
+    """outer(inverse) of two polynomials in the same step, between two steps, by a table and Newton's method."""
 
-    def __init__(self, function: Piecewise, start: float, stop: float) -> None:
-        self._function, self._start, self._stop = function, start, stop
+    def __init__(self, row: Array, outer: Array, start: float, stop: float) -> None:
+        self._row, self._slope = row, polyder(row)
+        self._outer, self._outer_slope = outer, polyder(outer)
+        steps = np.linspace(start, stop, 65)
+        order = np.argsort(polyval(steps, row))
+        self._steps, self._table = steps[order], polyval(steps, row)[order]
 
     def __call__(self, x: Array, derivative: int = 0, /) -> Array:
-        """Return the inverse or its slope at x (n,)."""
-        low, high = np.full(np.shape(x), self._start), np.full(np.shape(x), self._stop)
-        for _ in range(30):
-            middle = 0.5 * (low + high)
-            below = self._function(middle) < x
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
-        y = 0.5 * (low + high)
-        for _ in range(3):
-            y = y - (self._function(y) - x) / self._function(y, 1)
-        return 1.0 / self._function(y, 1) if derivative else y
+        """Return the value or its slope at x (n,)."""
+        step = np.interp(x, self._table, self._steps)
+        for _ in range(5):
+            step = step - (polyval(step, self._row) - x) / polyval(step, self._slope)
+        if derivative:
+            return polyval(step, self._outer_slope) / polyval(step, self._slope)
+        return polyval(step, self._outer)
 
 
 class _Made:
@@ -117,7 +129,7 @@ class _Made:
 
     def function(self, kind: str, error: float) -> Piecewise:
         """Return the function that the pieces make."""
-        padded = np.zeros((len(self.rows), DEGREE + 1))
+        padded = np.zeros((len(self.rows), max(map(len, self.rows))))
         for k, row in enumerate(self.rows):
             padded[k, : len(row)] = row
         return Piecewise(np.array(self.breaks), np.array(self.origins), padded, kind, max(error, self.worst))
@@ -143,5 +155,5 @@ def _quartic(function: Smooth, start: float, stop: float) -> tuple[float, Array,
     third = 0.5 * (0.5 * half * (slopes[0] + slopes[1]) - odd)
     row = np.array([at_middle, (odd - third) / half, (even - fourth) / half**2, third / half**3, fourth / half**4])
     x = middle + half * np.cos(np.linspace(0.0, np.pi, 21))
-    difference = np.polynomial.polynomial.polyval(x - middle, row) - function(x)
+    difference = polyval(x - middle, row) - function(x)
     return middle, row, float(np.abs(difference).max())

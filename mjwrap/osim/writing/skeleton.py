@@ -18,6 +18,7 @@ from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
 from mjwrap.osim.writing.inertias import Written, written_inertias
 from mjwrap.osim.writing.motions import Motion, evaluated
 from mjwrap.osim.writing.piece_algebra import composed, flattened
+from mjwrap.osim.writing.quartics import inverse_pieces
 from mjwrap.osim.writing.rotations import quaternion
 from mjwrap.osim.writing.sites import MOST_NUMBERS
 from mjwrap.osim.writing.tree import Branch, branches_of
@@ -51,7 +52,7 @@ class _Writer:
         self.taken = {*drivers.coordinates, *(each.joint for each in drivers.substitutes.values())}
         self.followers: list[tuple[str, float, str, Piecewise]] = []  # joint, reference, coordinate, function
         self.shown: set[str] = set()
-        self.references: dict[str, float] = {}
+        self.references = {name: drivers.value(name) for name in drivers.coordinates}
         self.ranges = {name: coordinate.range for name, coordinate in drivers.coordinates.items()}
         for name, each in drivers.substitutes.items():
             low, high = sorted(map(float, each.motion.function(drivers.coordinates[name].range)))
@@ -168,11 +169,16 @@ class _Writer:
                             driver[1].error or float("nan"), "rad or m" if driver[1].error else "")  # fmt: skip
 
     def follow(self, joint: str, reference: float, coordinate: str, function: Piecewise) -> None:
-        driver = self.drivers.driver(coordinate, precise=True)
-        assert driver is not None
-        leader, inner = driver
+        """Write that a joint is a function of a coordinate, and report it."""
+        leader, inner = self.drivers.leader(coordinate)
         total = function if inner is None else composed(function, inner)
-        at = self.drivers.value(leader) if leader in self.drivers.coordinates else self.references[leader]
+        substitute = self.drivers.substitutes.get(leader)
+        if substitute is not None:
+            low, high = substitute.extent
+            total = inverse_pieces(substitute.motion.function, low, high, outer=total)
+            assert total is not None
+            leader = substitute.joint
+        at = self.references[leader]
         low, high = self.ranges[leader]
         low, high = min(low, at), max(high, at)
         room = 0.1 * (high - low)
