@@ -36,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--geometry", nargs="+", action="extend", default=[], metavar="FOLDER", help="folders with the model's meshes, "
         "beside its own folder and the folder Geometry in it")  # fmt: skip
-    add("--no-meshes", action="store_true", help="leave out the meshes")
     add("--report", metavar="FILE.html", help="write the report as a page")
     add_json(parser, "write the report")
     add("--verify", action="store_true", help="compare the written model with OpenSim")
@@ -63,7 +62,6 @@ def execute(options: argparse.Namespace) -> int:
             model=options.model,
             out=options.out,
             geometry=tuple(options.geometry),
-            meshes=not options.no_meshes,
             page=options.report,
             json=options.json,
             verify=options.verify or options.numbers is not None,

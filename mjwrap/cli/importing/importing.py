@@ -36,7 +36,6 @@ class ImportSettings:
     model: str
     out: str | None
     geometry: tuple[str, ...]
-    meshes: bool
     page: str | None
     json: str | None
     verify: bool
@@ -57,7 +56,7 @@ def import_model(settings: ImportSettings) -> int:
     page = open_output(settings.page, "--report", ".html", ".htm") if settings.page else None
     report = Report(settings.json)
     known = _numbers(settings) if settings.verify else None  # a mistake here is reported early
-    imported = import_osim(settings.model, geometry=settings.geometry, meshes=settings.meshes)
+    imported = import_osim(settings.model, meshes=settings.geometry)
     imported.save(out)
     report.say(f"{out}: {_contents(imported)}")
     report.say(tell_entries(imported.report))
