@@ -126,7 +126,7 @@ def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int
     """Return the number of pairs of one model, and a line for each that differs by more than `CLOSE`."""
     with tempfile.TemporaryDirectory() as folder:
         written = Path(folder) / "model.xml"
-        mw.import_osim(path, geometry=geometry).save(written)
+        mw.import_osim(path, meshes=geometry).save(written)
         model = mujoco.MjModel.from_xml_path(str(written))
     data, muscles = mujoco.MjData(model), mw.MuscleSystem(model)
     names = muscles.coordinates
