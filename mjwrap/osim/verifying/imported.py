@@ -84,13 +84,16 @@ class ImportedModel:
     def _mass(self, independent: list[str]) -> Array:
         """Return NᵀMN about the rates of the independent coordinates."""
         model, data = self.model, self.data
-        full = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, full, data.qM)
         couplings = CoupledJoints(model)
         n = couplings.matrix(data.qpos)
         dofs = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
         n = n[:, np.searchsorted(couplings.independent, dofs)]
-        return n.T @ full @ n
+        product = np.zeros(model.nv)
+        columns = []
+        for column in n.T:
+            mujoco.mj_mulM(model, data, product, np.ascontiguousarray(column))
+            columns.append(product.copy())
+        return n.T @ np.array(columns).reshape(-1, model.nv).T
 
     def motion(self, given: MotionNumbers, timestep: float | None = None) -> Mapping[str, Array]:
         """Return the coordinates (frames,) along the motion that starts as OpenSim's did.
