@@ -129,7 +129,7 @@ def _compare_bodies(every: dict[str, Quantity], pose: PoseNumbers, ours: Importe
         skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         angle = float(np.arctan2(np.linalg.norm(skew), 0.5 * (np.trace(turn) - 1.0)))
         every["rotation"].add(angle, f"{name}, pose {k}")
-    if pose.mass is not None:
+    if pose.mass is not None and ours.mass is not None:
         theirs = np.array(pose.mass)
         scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
         every["mass"].add(float((np.abs(ours.mass - theirs) / scale).max()), f"pose {k}")

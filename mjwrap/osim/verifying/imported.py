@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.bench import simulate_muscle
 from mjwrap.osim.coordinates import set_coordinates
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
@@ -23,7 +22,7 @@ class ImportedNumbers:
     """An imported model's numbers at one pose, with the names and the order of `PoseNumbers`."""
 
     bodies: dict[str, Array]
-    mass: Array
+    mass: Array | None
     lengths: dict[str, float]
     statuses: dict[str, str]  # of paths that are not converged: why
     moment_arms: dict[str, dict[str, float]]
@@ -42,10 +41,11 @@ class ImportedModel:
         self._joints = {model.joint(i).name: i for i in range(model.njnt)}
 
     def at(self, pose: PoseNumbers, independent: list[str], activations: list[float]) -> ImportedNumbers:
-        """Return the numbers at a pose of OpenSim's; only its independent coordinates are set, the others follow."""
+        """Return the numbers at a pose of OpenSim's; coordinates that follow others by a function are not set."""
         model, data, muscles = self.model, self.data, self.muscles
         mujoco.mj_resetData(model, data)
-        set_coordinates(model, data, {name: pose.coordinates[name] for name in independent})
+        free = [name for name in muscles.coordinates if name in pose.coordinates]
+        set_coordinates(model, data, {name: pose.coordinates[name] for name in free})
         mujoco.mj_forward(model, data)
         muscles.reset(data)
         muscles.forward(data)
@@ -81,19 +81,33 @@ class ImportedModel:
         ]
         return np.array(found)
 
-    def _mass(self, independent: list[str]) -> Array:
-        """Return NᵀMN about the rates of the independent coordinates."""
+    def _mass(self, independent: list[str]) -> Array | None:
+        """Return NᵀMN about the rates of the independent coordinates, N from MuJoCo's equalities; None where these
+        leave other motions free, or a coordinate is no joint."""
         model, data = self.model, self.data
-        couplings = CoupledJoints(model)
-        n = couplings.matrix(data.qpos)
-        dofs = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
-        n = n[:, np.searchsorted(couplings.independent, dofs)]
-        product = np.zeros(model.nv)
-        columns = []
-        for column in n.T:
-            mujoco.mj_mulM(model, data, product, np.ascontiguousarray(column))
+        if any(name not in self._joints for name in independent):
+            return None
+        chosen = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
+        follow = np.setdiff1d(np.arange(model.nv), chosen)
+        product, columns = np.zeros(data.nefc), []
+        for unit in np.eye(model.nv):
+            mujoco.mj_mulJacVec(model, data, product, unit)
             columns.append(product.copy())
-        return n.T @ np.array(columns).reshape(-1, model.nv).T
+        equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        jacobian = np.array(columns).reshape(model.nv, -1).T[equal]
+        n = np.zeros((model.nv, len(chosen)))
+        n[chosen, np.arange(len(chosen))] = 1.0
+        if follow.size:
+            solved, _, rank, _ = np.linalg.lstsq(jacobian[:, follow], -jacobian[:, chosen], rcond=None)
+            if rank < follow.size:
+                return None
+            n[follow] = solved
+        inertia = np.zeros(model.nv)
+        moments = []
+        for column in n.T:
+            mujoco.mj_mulM(model, data, inertia, np.ascontiguousarray(column))
+            moments.append(inertia.copy())
+        return n.T @ np.array(moments).reshape(-1, model.nv).T
 
     def motion(self, given: MotionNumbers, timestep: float | None = None) -> Mapping[str, Array]:
         """Return the coordinates (frames,) along the motion that starts as OpenSim's did.
