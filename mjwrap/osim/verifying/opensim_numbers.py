@@ -21,7 +21,7 @@ WIDEST = {
     2: 1.0,
 }  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
 ACCURACY = 1e-9  # of OpenSim's integrator
-PASSIVE, DRIVEN, FRAMES = 0.3, 0.5, 31  # durations [s], and frames of a motion
+PASSIVE, DRIVEN, INTERVAL = 0.3, 0.5, 0.01  # durations of motions, and the time between their frames [s]
 EXCITATION = 0.2
 
 
@@ -283,7 +283,7 @@ class _Computer:
             manager = opensim.Manager(model)
             manager.setIntegratorAccuracy(ACCURACY)
             manager.initialize(state)
-            times = np.linspace(0.0, duration, FRAMES)
+            times = INTERVAL * np.arange(round(duration / INTERVAL) + 1)
             rows: dict[str, list[float]] = {name: [] for name in coordinates}
             for time in times:
                 if time > 0.0:
