@@ -15,6 +15,12 @@ from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
+DRIVEN_OFF = (
+    "LIMIT",
+    "CONTACT",
+    "SPRING",
+)  # what OpenSim's reference motions leave out: all but gravity and muscles
+PASSIVE_OFF = (*DRIVEN_OFF, "ACTUATION", "DAMPER")
 
 
 @dataclass(frozen=True)
@@ -137,21 +143,16 @@ class ImportedModel:
         for k, time in enumerate(given.time):
             steps = round((time - data.time) / model.opt.timestep)
             if steps > 0:
-                if passive:
-                    self._step_passively(data, steps)
-                else:
-                    muscles.step(data, steps)
+                self._step(data, steps, PASSIVE_OFF if passive else DRIVEN_OFF)
             rows[k] = data.qpos[places]
         return {name: rows[:, i] for i, name in enumerate(names)}
 
-    def _step_passively(self, data: mujoco.MjData, steps: int) -> None:
-        """Step with gravity and couplings, without muscles, springs and dampers."""
+    def _step(self, data: mujoco.MjData, steps: int, off: tuple[str, ...]) -> None:
+        """Step with some of MuJoCo's forces switched off, by the names of their flags."""
         model = self.model
         before = int(model.opt.disableflags)
-        flags = mujoco.mjtDisableBit
-        model.opt.disableflags = (
-            before | int(flags.mjDSBL_ACTUATION) | int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_CONTACT)
-        )
+        for name in off:
+            model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
         try:
             self.muscles.step(data, steps)
         finally:
