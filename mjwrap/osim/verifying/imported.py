@@ -150,13 +150,20 @@ class ImportedModel:
     def _step(self, data: mujoco.MjData, steps: int, off: tuple[str, ...]) -> None:
         """Step with some of MuJoCo's forces switched off, by the names of their flags."""
         model = self.model
-        before = int(model.opt.disableflags)
+        before, constants = (
+            int(model.opt.disableflags),
+            {name: getattr(model, name).copy() for name in SPRINGS},
+        )
         for name in off:
             model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
         try:
+            for name in SPRINGS:
+                getattr(model, name)[:] = 0.0
             self.muscles.step(data, steps)
         finally:
             model.opt.disableflags = before
+            for name, values in constants.items():
+                getattr(model, name)[:] = values
 
     def _start(self, data: mujoco.MjData, given: MotionNumbers) -> None:
         """Give the muscles OpenSim's states at the start."""
