@@ -8,6 +8,7 @@ muscle pulls on a slider, so that its length is any number; its other parameters
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import math
 import sys
@@ -15,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import opensim as osim
+
+osim: Any = importlib.import_module("opensim")  # not among the packages that mjwrap needs
 
 STATES = 200
 MODELS = (
