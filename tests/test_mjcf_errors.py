@@ -121,8 +121,8 @@ def test_a_path_actuator_without_a_force() -> None:
 
 
 def test_an_unknown_numeric() -> None:
-    text = tuple_message(*ACTUATOR, values=HILL | {"stiffness": 3.0})
-    assert "numeric 'mjwrap_m_stiffness' must contain exactly one of these in its name" in text
+    text = tuple_message(*ACTUATOR, values=HILL | {"flexibility": 3.0})
+    assert "numeric 'mjwrap_m_flexibility' must contain exactly one of these in its name" in text
     assert NUMERICS in text
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ DIP = (2, 1.5, 1.0, 1.5, 0.0, 0.0, -1.0, 4.0, 0.25, 2.0, 0.0, 0.0)
 def spline() -> mw.Ligament:
     """Return a ligament with the pieces of that spline: cubic between two knots, straight after the last."""
     pieces = []
-    for (x, y, low), (end, top, high) in zip(KNOTS, KNOTS[1:], strict=False):
+    for (x, y, low), (end, top, high) in itertools.pairwise(KNOTS):
         h, d = end - x, (top - y) / (end - x)
         pieces.append([y, low, (3.0 * d - 2.0 * low - high) / h, (low + high - 2.0 * d) / h**2])
     pieces.append([KNOTS[2][1], KNOTS[2][2], 0.0, 0.0])
@@ -77,7 +78,7 @@ def test_the_energy_of_a_ligament_is_the_integral_of_its_tension() -> None:
         bounds = [0.1, *(c for c in corners if 0.1 < c < x), x]
         wanted = sum(
             quad(lambda y: pull(law, float(y)), a, b, epsabs=1e-15, epsrel=1e-13)[0]
-            for a, b in zip(bounds, bounds[1:], strict=False)
+            for a, b in itertools.pairwise(bounds)
         )
         assert dispatch.fiberless_energy(code[0], params, 0, x) == pytest.approx(wanted, rel=1e-12, abs=1e-13)
 
