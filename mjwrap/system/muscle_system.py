@@ -141,8 +141,9 @@ class MuscleSystem(Evaluator):
         Joints that follow a coordinate by an equality of the model move with it, so a column is the negative slope of
         the lengths along the coupled motion: −J N, with J = ∂l/∂q of `length_jacobian`, which is called first, and
         N = ∂q/∂q_independent. The equalities are those that are active at the model's start, in the pieces that hold at
-        qpos; followers are taken where qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the muscle's pull drives the coordinate up.
-        A muscle without a path has the moment arms of its last valid path, 0 before it had one.
+        qpos; followers are taken where qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the
+        muscle's pull drives the coordinate up. A muscle without a path has the moment arms of its last valid path, 0
+        before it had one.
 
         Args:
             data: the state; only poses are used.
