@@ -81,7 +81,7 @@ class Spline:
         found = []
         for piece in self.pieces:
             c = np.zeros(5)
-            moved = np.asarray((piece(shifted) - start).coef) * factor
+            moved = np.asarray((piece(shifted) - start).coef, dtype=np.float64) * factor
             c[: len(moved)] = moved
             found.append(c)
         return found
