@@ -26,9 +26,9 @@ from mjwrap.kernels.geometry.traits import one_sided, sided
 HINT, POS, SIZE, S_MODE, S_ARC = lay.HINT, lay.POS, lay.SIZE, lay.S_MODE, lay.S_ARC
 
 LEVEL = 1e-9  # a place that is less far on the other half, in the surface's size, is in the middle
-# a guess whose middle is so deep on the other half, in sizes, or which is longer by such a share, is given up
+# a guess whose middle is so deep on the other half, in sizes, or whose detour is longer by such a share, is given up
 HOPELESS_DEPTH = 0.3
-HOPELESS_LENGTH = 0.05
+HOPELESS_DETOUR = 0.4
 ON_AXIS = 1e-9  # a direction whose part across the axis is a smaller share of the size gives no side
 
 
@@ -105,7 +105,9 @@ def is_hopeless(k, ends, node, best):
     px, py, pz = node[k, p] - ends[3], node[k, p + 1] - ends[4], node[k, p + 2] - ends[5]
     qx, qy, qz = node[k, q] - ends[6], node[k, q + 1] - ends[7], node[k, q + 2] - ends[8]
     total = math.sqrt(px * px + py * py + pz * pz) + arc + math.sqrt(qx * qx + qy * qy + qz * qz)
-    return total > (1.0 + HOPELESS_LENGTH) * best
+    dx, dy, dz = ends[6] - ends[3], ends[7] - ends[4], ends[8] - ends[5]
+    straight = math.sqrt(dx * dx + dy * dy + dz * dz)
+    return total - straight > (1.0 + HOPELESS_DETOUR) * (best - straight)
 
 
 @jit
