@@ -93,8 +93,8 @@ X = np.array([-3.0, -1.0, -0.5, 0.0, 0.3, 1.0, 2.0, 4.0])
         ),
         (
             "<MultiplierFunction><function><MultiplierFunction><function><LinearFunction>"
-            "<coefficients>1 1</coefficients></LinearFunction></function><scale>3</scale></MultiplierFunction></function>"
-            "<scale>-2</scale></MultiplierFunction>",
+            "<coefficients>1 1</coefficients></LinearFunction></function><scale>3</scale>"
+            "</MultiplierFunction></function><scale>-2</scale></MultiplierFunction>",
             -6.0 * (X + 1.0),
         ),
         (

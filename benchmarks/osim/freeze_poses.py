@@ -12,8 +12,11 @@ With --compare it prints how far mjwrap is from OpenSim at 50 random poses of ea
 from __future__ import annotations
 
 import json
+import multiprocessing
 import re
 import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -35,15 +38,20 @@ EXACT_ORIENTATIONS = {
 
 def main() -> None:
     folder, own, output = (Path(argument) for argument in sys.argv[1:4])
-    opensim.Logger.setLevelString("Off")
     paths = sorted(folder.glob("*.osim")) + sorted(own.glob("own_*.osim"))
     if "--compare" in sys.argv:
         compare(paths)
         return
-    write(output / "poses.json", {path.name: poses_of(path, POSES) for path in paths})
-    write(output / "muscles.json", {path.name: found for path in paths if (found := muscles_of(path))})
+    write(output / "poses.json", {path.name: alone(poses_of, path, POSES) for path in paths})
+    write(output / "muscles.json", {path.name: found for path in paths if (found := alone(muscles_of, path))})
     write(output / "splines.json", splines())
-    write_again(own / "own_version_3.osim", output / "upgraded_version_3.osim")
+    alone(write_again, own / "own_version_3.osim", output / "upgraded_version_3.osim")
+
+
+def alone(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return what a function returns in a process of its own: OpenSim keeps one model's <defaults> for the next."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(function, *arguments).result()
 
 
 def write(path: Path, records: dict[str, Any]) -> None:
@@ -64,6 +72,7 @@ def write_again(source: Path, target: Path) -> None:
 
 def loaded(path: Path) -> tuple[Any, Any]:
     """Return a model and its state."""
+    opensim.Logger.setLevelString("Off")
     model = opensim.Model(str(path))
     for frame, angles in EXACT_ORIENTATIONS.get(path.name, {}).items():
         found = opensim.PhysicalOffsetFrame.safeDownCast(model.updComponent(frame))
@@ -209,7 +218,7 @@ def compare(paths: list[Path]) -> None:
     for path in paths:
         model = read_osim(path)
         worst, longest, lengths = 0.0, 0.0, 0
-        for record in poses_of(path, COMPARED):
+        for record in alone(poses_of, path, COMPARED):
             values = complete(model, record["values"])
             poses = body_poses(model, values)
             frames = {body: poses[body] for body in record["bodies"]}
