@@ -2,12 +2,15 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 from osim_frozen import frozen, model_path
 
 from mjwrap.osim.description.forces import Bushing, HuntCrossley, LimitForce, Muscle, OtherForce
+from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading import read_osim
 
@@ -22,16 +25,16 @@ OLD_SOCKET = "connector_parent_frame_connectee_name"
 END = "</Model></OpenSimDocument>"
 
 
-def named(model, name):
+def named(model: OsimModel, name: str) -> Any:
     return next(force for force in model.forces if force.name == name)
 
 
-def read_text(tmp_path, text: str):
+def read_text(tmp_path, text: str) -> OsimModel:
     (tmp_path / "model.osim").write_text(text, encoding="utf-8")
     return read_osim(tmp_path / "model.osim")
 
 
-def differences(first, second, place=""):
+def differences(first: Any, second: Any, place: str = "") -> Iterator[str]:
     """Yield the places at which two descriptions differ by more than the six digits of OpenSim's converter."""
     if dataclasses.is_dataclass(first) and type(first) is type(second):
         for field in dataclasses.fields(first):
@@ -195,7 +198,7 @@ def test_coordinates_with_one_name_get_names_of_their_own_and_paths_tell_them_ap
     )
     model = read_text(tmp_path, HEAD + bodies + joints + force + "</objects></ForceSet>" + END)
     assert [c.name for c in model.coordinates] == ["q", "k_q"]
-    assert [f.coordinate for f in model.forces] == ["q", "q", "k_q"]
+    assert [named(model, name).coordinate for name in ("f0", "f1", "f2")] == ["q", "q", "k_q"]
 
 
 @pytest.mark.parametrize(
