@@ -52,6 +52,7 @@ def differences(first: Any, second: Any, place: str = "") -> Iterator[str]:
         for key in first:
             yield from differences(first[key], second[key], f"{place}[{key}]")
     elif isinstance(first, float):
+        assert isinstance(second, float)
         if not math.isclose(first, second, rel_tol=1e-6, abs_tol=1e-6):
             yield place
     elif first != second:
@@ -130,6 +131,20 @@ def test_limit_forces_of_angles_are_in_radians():
     assert told == pytest.approx(
         (90 * degree, -45 * degree, 2 / degree, 3 / degree, 0.1 / degree, 10 * degree)
     )
+
+
+def test_a_ligament_without_a_curve_has_opensims(tmp_path):
+    path = "".join(
+        f'<PathPoint name="{body}"><socket_parent_frame>/{body}</socket_parent_frame></PathPoint>'
+        for body in ("ground", "bodyset/b")
+    )
+    force = (
+        f'<ForceSet><objects><Ligament name="l"><GeometryPath><PathPointSet><objects>{path}</objects></PathPointSet>'
+        "</GeometryPath><resting_length>0.1</resting_length></Ligament></objects></ForceSet>"
+    )
+    ligament = named(read_text(tmp_path, HEAD + BODY + PIN + force + END), "l")
+    wanted = [-3.2306612054232605e-05, 0.009490495275649737, 0.12, 1.7075513639847175, 2.0043435968913625]
+    assert ligament.curve([0.9, 1.05, 1.2, 1.55, 2.0]) == pytest.approx(wanted, abs=1e-14)  # of OpenSim 4.6
 
 
 def test_nested_frames_lead_to_their_body():
