@@ -89,8 +89,6 @@ def test_muscle_parameters_and_curves_are_those_of_opensim(name):
         assert muscle.active == wanted.pop("appliesForce")
         assert muscle.control_range == (wanted.pop("min_control"), wanted.pop("max_control"))
         assert muscle.rigid_tendon == wanted["ignore_tendon_compliance"]
-        if "Deprecated" in muscle.kind:
-            wanted = {tag: value for tag, value in wanted.items() if tag in muscle.parameters}
         assert muscle.parameters == wanted
         assert muscle.curves.keys() == record["curves"].keys()
         for kind, values in record["curves"].items():
@@ -145,6 +143,14 @@ def test_a_ligament_without_a_curve_has_opensims(tmp_path):
     ligament = named(read_text(tmp_path, HEAD + BODY + PIN + force + END), "l")
     wanted = [-3.2306612054232605e-05, 0.009490495275649737, 0.12, 1.7075513639847175, 2.0043435968913625]
     assert ligament.curve([0.9, 1.05, 1.2, 1.55, 2.0]) == pytest.approx(wanted, abs=1e-14)  # of OpenSim 4.6
+
+
+def test_a_schutte_muscle_has_opensims_curves_where_it_lists_none():
+    muscle = named(read_osim(model_path("own_version_3.osim")), "m2")
+    assert muscle.splines["tendon_force_length_curve"](2.0) == 4.0  # of the file
+    assert muscle.splines["active_force_length_curve"](1.045) == 0.993333
+    assert muscle.splines["passive_force_length_curve"](1.55) == pytest.approx(1.7075513639847175, abs=1e-14)
+    assert (muscle.parameters["activation1"], muscle.parameters["time_scale"]) == (7.0, 0.05)
 
 
 def test_nested_frames_lead_to_their_body():

@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from mjwrap.osim.description.bodies import Coordinate, Frame
 from mjwrap.osim.description.forces import (
     Bushing,
@@ -23,13 +21,13 @@ from mjwrap.osim.description.forces import (
 )
 from mjwrap.osim.description.paths import Path
 from mjwrap.osim.description.rotations import body_fixed_xyz
+from mjwrap.osim.reading.default_curves import PASSIVE_FORCE_LENGTH, spline_through
 from mjwrap.osim.reading.frames import Places, offset, socket, unnamed
 from mjwrap.osim.reading.functions import read_function
 from mjwrap.osim.reading.joints import ROTATIONAL
 from mjwrap.osim.reading.muscles import is_muscle, read_muscle
 from mjwrap.osim.reading.nodes import Node
 from mjwrap.osim.reading.paths import path_node, read_path
-from mjwrap.osim.reading.splines import simm_spline
 
 _INFINITE = math.inf
 
@@ -68,7 +66,7 @@ def _ligament(node: Node, name: str, path: Path, active: bool) -> Force:
     if not length > 0.0:
         raise node.error(f"resting_length must be positive, not {length:g}")
     given = node.object("force_length_curve")
-    curve = simm_spline(*_LIGAMENT_CURVE) if given is None else read_function(given)
+    curve = spline_through(PASSIVE_FORCE_LENGTH) if given is None else read_function(given)
     return Ligament(name, path, length, node.number("pcsa_force", default=0.0), curve, active)
 
 
@@ -170,11 +168,6 @@ def _contact(node: Node, name: str, known: Known, active: bool) -> Force:
     return HuntCrossley(name, node.tag, tuple(shapes), parameters, active, by_shape)
 
 
-# force over length of a ligament without a curve of its own, in units of pcsa_force and of resting_length
-_LIGAMENT_CURVE = (
-    np.array([-5.0, 0.998, 0.999, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.601, 1.602, 5.0]),
-    np.array([0.0, 0.0, 0.0, 0.0, 0.035, 0.12, 0.26, 0.55, 1.17, 2.0, 2.0, 2.0, 2.0]),
-)
 _CONTACT = ("stiffness", "dissipation", "static_friction", "dynamic_friction", "viscous_friction")
 _SMOOTH = {
     "stiffness": 1.0,
