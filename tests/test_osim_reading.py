@@ -14,7 +14,7 @@ from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading import read_osim
 
-MUSCLES = frozen("muscles.json")
+MUSCLES = frozen("muscle_parameters.json")
 HEAD = '<OpenSimDocument Version="40000"><Model name="m"><Ground name="ground"/>'
 BODY = '<BodySet><objects><Body name="b"><mass>1</mass></Body></objects></BodySet>'
 PIN = (
