@@ -77,8 +77,11 @@ class Axis:
 class Joint:
     """A joint: its child frame is moved in the parent frame, then turned about three body-fixed axes.
 
-    All joints but those with `radii` are written so, pin, ball, free and the others too: an axis without motion has a
-    constant function.
+    As in the file, the child may be the body nearer to ground, and several joints may have one child.
+    All joints are written so, pin, ball, free and the others too: an axis without motion has a constant function.
+    EllipsoidJoint and ScapulothoracicJoint have `radii`: their translation is radii * (z of the turned frame), so that
+    the origin stays on an ellipsoid. The fourth coordinate of a ScapulothoracicJoint then turns the child frame about
+    the axis (-sin, cos, 0)(winging_direction) through (winging_origin, 0), both in the turned frame.
     """
 
     name: str
@@ -90,7 +93,7 @@ class Joint:
         Axis, Axis, Axis
     ]  # in the order in which they turn; each axis in the frame turned so far
     translations: tuple[Axis, Axis, Axis]  # axes in the parent frame
-    radii: Array | None = None  # (3,) of EllipsoidJoint and ScapulothoracicJoint [m]; then see `kind`
+    radii: Array | None = None  # (3,) of EllipsoidJoint and ScapulothoracicJoint [m]
     winging_origin: Array | None = None  # (2,) of a ScapulothoracicJoint [m]
     winging_direction: float = 0.0  # of a ScapulothoracicJoint [rad]
 

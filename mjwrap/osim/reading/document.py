@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.parsers import expat
 
@@ -32,10 +33,29 @@ def read_document(path: Path) -> Node:
     document.version = int(text)
     if document.version < OLDEST:
         raise OsimError(
-            f"{path}: has document version {document.version}, older than OpenSim 2.0; open it in OpenSim and save it again"
+            f"{path}: has document version {document.version}, older than OpenSim 2.0; "
+            "open it in OpenSim and save it again"
         )
+    for node in list(root.walk()):
+        if node.tag.endswith("Set") and node.attributes.get("file", "").strip():
+            _include(node, path.parent / node.attributes["file"].strip())
     _apply_defaults(root)
     return root
+
+
+def _include(node: Node, path: Path) -> None:
+    """Fill a set from the file that it names."""
+    try:
+        data = path.read_bytes()
+    except OSError as problem:
+        raise node.error(f"its file {path} cannot be read: {problem.strerror or problem}") from None
+    document = replace(node.document, file=str(path))  # with the same list of notes
+    found = next((inner for inner in parse(_decoded(data), document).walk() if inner.tag == node.tag), None)
+    if found is None:
+        raise node.error(f"its file {path} has no <{node.tag}>")
+    node.children = found.children
+    for child in node.children:
+        child.parent = node
 
 
 def parse(text: str, document: Document) -> Node:

@@ -15,9 +15,10 @@ from mjwrap.osim.reading.splines import natural_spline, simm_spline
 
 Array = NDArray[np.float64]
 
+DENSEST = 400  # points of a spline of degree 5 or 7, whose equations are solved at once
 SINE_REACH = 10.0  # a sine is approximated where its variable is at most this far from 0
 SINE_PIECE = 0.25  # [rad] length of a piece
-SINE_DEGREE = 7
+SINE_DEGREE = 9
 
 
 def read_function(node: Node) -> Piecewise:
@@ -92,8 +93,10 @@ def _gcv_spline(node: Node) -> Piecewise:
         raise node.error(
             "smooths its points (error_variance is not 0), which cannot be read; set error_variance to 0"
         )
-    if x.size < 2 * int(half_order):
+    if x.size < 2 * half_order:
         raise node.error(f"has {x.size} points; a spline of this degree needs at least {2 * int(half_order)}")
+    if half_order > 2 and x.size > DENSEST:
+        raise node.error(f"has {x.size} points; a spline of this degree may have at most {DENSEST}")
     return natural_spline(x, y, int(half_order))
 
 
@@ -160,7 +163,8 @@ def _multiplier(node: Node) -> Piecewise:
         raise node.error("the function that it multiplies is missing")
     function = read_function(inner)
     scale = node.number("scale", default=1.0)
-    return replace(function, coefficients=scale * function.coefficients, error=abs(scale) * function.error)
+    coefficients, error = scale * function.coefficients, abs(scale) * function.error
+    return replace(function, coefficients=coefficients, error=error, kind=node.tag)
 
 
 _READERS: dict[str, Callable[[Node], Piecewise]] = {

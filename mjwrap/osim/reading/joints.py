@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mjwrap.osim.description.bodies import GROUND, Axis, Coordinate, Frame, Joint
+from mjwrap.osim.description.bodies import Axis, Coordinate, Frame, Joint
 from mjwrap.osim.description.functions import Piecewise, constant, linear
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading.frames import Places, offset, socket
@@ -62,7 +62,7 @@ def read_joint(node: Node, places: Places, names: dict[int, str], name: str) -> 
         known = {element.name: names[id(element)] for element in elements}
         axes = _custom_axes(node, known)
     else:
-        axes, known = _fixed_axes(node, elements, names, name)
+        axes, known = _fixed_axes(node, elements, names)
     coordinates = _coordinates(node, elements, list(known.values()), axes, name)
     radii, origin, direction = None, None, 0.0
     if node.tag == "EllipsoidJoint":
@@ -99,18 +99,20 @@ def _still(index: int) -> Axis:
 
 
 def _fixed_axes(
-    node: Node, elements: Sequence[Node], names: dict[int, str], joint: str
+    node: Node, elements: Sequence[Node], names: dict[int, str]
 ) -> tuple[list[Axis], dict[str, str]]:
     driven = SIMPLE.get(node.tag, ())
     count = 4 if node.tag == SCAPULOTHORACIC else len(driven)
-    if len(elements) > count:
+    if len(elements) != count:
         raise node.error(f"has {len(elements)} coordinates; a {node.tag} has {count}")
     known = {element.name: names[id(element)] for element in elements}
-    for i in range(len(elements), count):
-        known[f"{joint}_coord_{i}"] = f"{joint}_coord_{i}"
-    if len(known) < count:
-        raise node.error("two of its coordinates have the same name")
     axes = [_still(i) for i in range(6)]
+    if (
+        node.tag == SCAPULOTHORACIC
+    ):  # abduction, elevation, upward rotation; the fourth, winging, comes after them
+        turns = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        for i, (turn, coordinate) in enumerate(zip(turns, known.values(), strict=False)):
+            axes[i] = Axis(np.array(turn), (coordinate,), linear(1.0))
     for coordinate, i in zip(known.values(), driven, strict=False):
         axes[i] = Axis(axes[i].axis, (coordinate,), linear(1.0))
     return axes, known
@@ -163,9 +165,6 @@ def _coordinates(
     result = []
     for i, name in enumerate(names):
         motion = _motion(node, name, axes)
-        if i >= len(elements):
-            result.append(Coordinate(name, joint, motion, 0.0, 0.0, (-10.0, 10.0), False, False))
-            continue
         element = elements[i]
         low, high = element.vector("range", size=2, default=(-10.0, 10.0), finite=False)
         if not low <= high:
@@ -191,15 +190,16 @@ def _coordinates(
 
 
 def _motion(node: Node, name: str, axes: Sequence[Axis]) -> str:
-    """Return whether a coordinate is an angle, a length, or neither as it drives motions by functions of it."""
+    """Return whether a coordinate is an angle, a length, or neither, by OpenSim's rule: the last motion that it drives
+    with a slope of 1 or -1."""
     if node.tag == SCAPULOTHORACIC:
         return ROTATIONAL
+    motion = COUPLED
     for i, axis in enumerate(axes):
-        if name in axis.coordinates:
-            function = axis.function
-            if function.is_linear and function.coefficients[0, 1] == 1.0:
-                return ROTATIONAL if i < 3 else TRANSLATIONAL
-    return COUPLED
+        linear_in_it = name in axis.coordinates and axis.function.kind == "LinearFunction"
+        if linear_in_it and abs(axis.function.coefficients[0, 1]) == 1.0:
+            motion = ROTATIONAL if i < 3 else TRANSLATIONAL
+    return motion
 
 
 def _radii(node: Node, tag: str) -> Array:
@@ -207,20 +207,3 @@ def _radii(node: Node, tag: str) -> Array:
     if not np.all(radii > 0.0):
         raise node.error(f"{tag} must be positive")
     return radii
-
-
-def free_joint(body: str, name: str) -> Joint:
-    """Return the free joint that OpenSim gives to a body without a joint."""
-    zero = Frame(GROUND, np.zeros(3), np.eye(3))
-    names = [f"{name}_coord_{i}" for i in range(6)]
-    axes = [Axis(np.eye(3)[i % 3], (names[i],), linear(1.0)) for i in range(6)]
-    coordinates = tuple(
-        Coordinate(
-            names[i], name, ROTATIONAL if i < 3 else TRANSLATIONAL, 0.0, 0.0, (-10.0, 10.0), False, False
-        )
-        for i in range(6)
-    )
-    child = Frame(body, np.zeros(3), np.eye(3))
-    return Joint(
-        name, "FreeJoint", zero, child, coordinates, (axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5])
-    )

@@ -53,16 +53,26 @@ def _curve(muscle: Node, kind: str) -> dict[str, float]:
             values[tag] = (
                 (node.numbers(tag) or [default])[0] if default is None else node.number(tag, default=default)
             )
-    if kind == "FiberForceLengthCurve":
-        values.update(_fiber(values))
-    elif kind == "TendonForceLengthCurve":
-        values.update(_tendon(values))
+    stretch = (values.get("strain_at_one_norm_force") or 0.0) - (values.get("strain_at_zero_force") or 0.0)
+    if node is not None and "strain_at_one_norm_force" in values and not stretch > 0.0:
+        raise node.error("strain_at_one_norm_force must be positive and above strain_at_zero_force")
+    fitted = [tag for tag, default in CURVES[kind].items() if default is None]
+    given = [tag for tag in fitted if values[tag] is not None]
+    if given and len(given) < len(fitted):
+        assert node is not None
+        raise node.error(f"gives {', '.join(given)} only; {', '.join(fitted)} must be given all or none")
+    if fitted and not given:
+        values.update(_fiber(stretch) if kind == "FiberForceLengthCurve" else _tendon(stretch))
     return {tag: float(value) for tag, value in values.items() if value is not None}
 
 
-def _fiber(values: dict[str, float | None]) -> dict[str, float]:
-    return {}
+def _fiber(stretch: float) -> dict[str, float]:
+    return {"stiffness_at_low_force": 0.2, "stiffness_at_one_norm_force": 2.0 / stretch, "curviness": 0.75}
 
 
-def _tendon(values: dict[str, float | None]) -> dict[str, float]:
-    return {}
+def _tendon(stretch: float) -> dict[str, float]:
+    return {
+        "stiffness_at_one_norm_force": 1.375 / stretch,
+        "norm_force_at_toe_end": 2.0 / 3.0,
+        "curviness": 0.5,
+    }

@@ -7,17 +7,18 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mjwrap.errors import OsimError
-from mjwrap.osim.description.bodies import GROUND, Joint
+from mjwrap.osim.description.bodies import GROUND
 from mjwrap.osim.description.forces import OtherForce
 from mjwrap.osim.description.model import Marker, OsimModel
 from mjwrap.osim.reading.constraints import read_constraint
 from mjwrap.osim.reading.document import read_document
 from mjwrap.osim.reading.forces import Known, read_force
 from mjwrap.osim.reading.frames import FRAMES, STATIONS, Places
-from mjwrap.osim.reading.joints import coordinate_nodes, free_joint, joint_nodes, read_joint
+from mjwrap.osim.reading.joints import coordinate_nodes, joint_nodes, read_joint
 from mjwrap.osim.reading.nodes import Node
 from mjwrap.osim.reading.paths import read_wrap, wrap_nodes
 from mjwrap.osim.reading.shapes import is_ground, read_body, read_contact_shape, read_meshes
+from mjwrap.osim.reading.trees import connected
 
 
 def read_osim(path: str | os.PathLike[str]) -> OsimModel:
@@ -51,15 +52,15 @@ class _Reader:
                 places.add(node)
         joint_elements = joint_nodes(model)
         self._name_coordinates(joint_elements)
-        names = _unique_names(joint_elements, "joint")
+        names = _unique_names(joint_elements)
         joints = [
             read_joint(n, places, self.coordinate_names, name)
             for n, name in zip(joint_elements, names, strict=True)
         ]
-        joints = self._connected(bodies, joints, joint_elements)
+        joints = connected(bodies, joints, joint_elements)
         coordinates = {c.name: c for joint in joints for c in joint.coordinates}
         wrap_elements = wrap_nodes(model)
-        wrap_names = _unique_names(wrap_elements, "wrap")
+        wrap_names = _unique_names(wrap_elements)
         wraps = tuple(read_wrap(n, places, name) for n, name in zip(wrap_elements, wrap_names, strict=True))
         by_name: dict[str, str] = {}
         for node, name in zip(wrap_elements, wrap_names, strict=True):
@@ -69,12 +70,12 @@ class _Reader:
         ]
         known = Known(places, self.coordinate, coordinates, by_name, frozenset(s.name for s in shapes))
         force_elements = model.objects("ForceSet")
-        force_names = _unique_names(force_elements, "force")
+        force_names = _unique_names(force_elements)
         forces = tuple(
             read_force(n, name, known) for n, name in zip(force_elements, force_names, strict=True)
         )
         constraint_elements = model.objects("ConstraintSet")
-        constraint_names = _unique_names(constraint_elements, "constraint")
+        constraint_names = _unique_names(constraint_elements)
         read = (
             read_constraint(n, name, places, self.coordinate)
             for n, name in zip(constraint_elements, constraint_names, strict=True)
@@ -128,34 +129,6 @@ class _Reader:
                 self.coordinate_names[id(node)] = name
                 self.places.add(node)
 
-    def _connected(self, bodies: list[Node], joints: list[Joint], elements: list[Node]) -> list[Joint]:
-        """Return the joints with a free one for every body without; bodies must form trees that start at ground."""
-        parents: dict[str, tuple[str, Node]] = {}
-        for joint, node in zip(joints, elements, strict=True):
-            child = joint.child.body
-            if child == GROUND:
-                raise node.error("its child frame is on ground; swap parent_frame and child_frame")
-            if child in parents:
-                raise node.error(
-                    f"body '{child}' is already the child of joint '{parents[child][1].name}'; "
-                    "replace one of the two by a constraint"
-                )
-            parents[child] = joint.parent.body, node
-        for start, (_, node) in parents.items():
-            body, seen = start, {start}
-            while body in parents:
-                body = parents[body][0]
-                if body in seen:
-                    raise node.error(
-                        f"bodies form a loop: {', '.join(sorted(seen))}; attach one of them to ground"
-                    )
-                seen.add(body)
-        for node in bodies:
-            if node.name not in parents:
-                node.note("has no joint; like in OpenSim it moves freely")
-                joints.append(free_joint(node.name, f"free_{node.name}"))
-        return joints
-
     def _others(self) -> list[OtherForce]:
         sets = ("ControllerSet", "ProbeSet", "ComponentSet", "components")
         skipped = {"Body", *FRAMES, *STATIONS}
@@ -167,13 +140,13 @@ class _Reader:
         ]
 
 
-def _unique_names(nodes: list[Node], kind: str) -> list[str]:
-    """Return a name for each element: its own, or one made of it where it is empty or taken."""
+def _unique_names(nodes: list[Node]) -> list[str]:
+    """Return a name for each element: its own, or as in OpenSim its class where it has none."""
     taken = {node.name for node in nodes}
     used: set[str] = set()
     names = []
-    for i, node in enumerate(nodes):
-        name = node.name or f"{kind}_{i + 1}"
+    for node in nodes:
+        name = node.name or node.tag.lower()
         wanted, number = name, 2
         while name in used or (name != node.name and name in taken):
             name = f"{wanted}_{number}"

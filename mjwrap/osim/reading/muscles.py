@@ -70,10 +70,7 @@ OWN: dict[str, dict[str, float]] = {
     "RigidTendonMuscle": {},
 }
 LEAST_CONTROL = {"Thelen2003Muscle": 0.01, "Millard2012EquilibriumMuscle": 0.01}
-OLDER = {
-    "pennation_angle_at_optimal": ("pennation_angle",),
-    "max_contraction_velocity": ("Vmax",),
-}
+NEW_PENNATION = 20302  # the document version that first had pennation_angle_at_optimal
 SPLINES = (
     "active_force_length_curve",
     "passive_force_length_curve",
@@ -102,6 +99,9 @@ def read_muscle(node: Node, name: str, path: Path, active: bool) -> Muscle:
         raise node.error(
             f"tendon_slack_length must not be negative, not {parameters['tendon_slack_length']:g}"
         )
+    fastest, older = parameters["max_contraction_velocity"], node.find("Vmax")
+    if node.tag in OWN and older is not None and older.values() != [fastest]:
+        node.note(f"its Vmax is not used; as in OpenSim 4 max_contraction_velocity is {fastest:g}")
     curves: Mapping[str, Mapping[str, float]] = {}
     if node.tag in MILLARD_CLASSES:
         curves = read_curves(node)
@@ -116,7 +116,9 @@ def read_muscle(node: Node, name: str, path: Path, active: bool) -> Muscle:
 
 
 def _value(node: Node, tag: str, default: float) -> float:
-    tags = (tag, *OLDER.get(tag, ()))
+    tags = (tag,)
+    if tag == "pennation_angle_at_optimal" and node.document.version < NEW_PENNATION:
+        tags = (tag, "pennation_angle")
     if tag.startswith("ignore_"):
         return float(node.flag(*tags, default=bool(default)))
     if node.find(*tags) is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mjwrap.osim.description.bodies import GROUND, Body, Frame, Mesh
@@ -24,6 +26,9 @@ _CONTACTS: dict[str, tuple[tuple[str, int], ...]] = {
     "ContactCylinder": (("radius", 1),),
     "ContactTorus": (("torus_radius", 1), ("tube_radius", 1)),
 }
+NEW_INERTIA = (
+    30500  # the document version that first had <inertia>; before, a missing moment of inertia was 1
+)
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -39,9 +44,9 @@ def _inertia(node: Node) -> Array:
     if node.find("inertia") is not None:
         xx, yy, zz, xy, xz, yz = node.vector("inertia", size=6, default=(0.0,) * 6)
     else:
-        xx, yy, zz, xy, xz, yz = (
-            node.number(f"inertia_{ij}", default=0.0) for ij in ("xx", "yy", "zz", "xy", "xz", "yz")
-        )
+        default = 1.0 if node.document.version < NEW_INERTIA else 0.0
+        xx, yy, zz = (node.number(f"inertia_{ii}", default=default) for ii in ("xx", "yy", "zz"))
+        xy, xz, yz = (node.number(f"inertia_{ij}", default=0.0) for ij in ("xy", "xz", "yz"))
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
@@ -57,8 +62,8 @@ def read_meshes(model: Node, places: Places) -> dict[str, tuple[Mesh, ...]]:
         elif node.tag == "DisplayGeometry":
             mesh = _displayed(node, places)
         elif node.tag == "geometry_files" and parent.tag == "VisibleObject":
-            for i, file in enumerate(node.text.split()):
-                listed = _listed(parent, places, file, i)
+            for file in node.text.split():
+                listed = _listed(parent, places, file)
                 if listed is not None:
                     found.setdefault(listed.frame.body, []).append(listed)
             continue
@@ -66,7 +71,12 @@ def read_meshes(model: Node, places: Places) -> dict[str, tuple[Mesh, ...]]:
             continue
         if mesh is not None:
             found.setdefault(mesh.frame.body, []).append(mesh)
-    return {body: tuple(meshes) for body, meshes in found.items()}
+    return {
+        body: tuple(
+            mesh if mesh.name else replace(mesh, name=f"{body}_geom_{i + 1}") for i, mesh in enumerate(meshes)
+        )
+        for body, meshes in found.items()
+    }
 
 
 def _owner(node: Node) -> Node | None:
@@ -119,25 +129,25 @@ def _displayed(node: Node, places: Places) -> Mesh | None:
         return None
     while visible is not None and visible.tag != "VisibleObject":
         visible = visible.parent
-    transform = node.vector("transform", size=6, default=(0.0,) * 6)
-    frame = offset(places.of(owner), transform[3:], body_fixed_xyz(transform[:3]))
     ones = (1.0, 1.0, 1.0)
-    scale = node.vector("scale_factors", size=3, default=ones)
-    if visible is not None:
-        scale = scale * visible.vector("scale_factors", size=3, default=ones)
+    frame, scale = places.of(owner), np.ones(3)
+    for element in (visible, node):
+        if element is not None:
+            transform = element.vector("transform", size=6, default=(0.0,) * 6)
+            frame = offset(frame, transform[3:], body_fixed_xyz(transform[:3]))
+            scale = scale * element.vector("scale_factors", size=3, default=ones)
     color = node.vector("color", size=3, default=ones).tolist()
     hidden = node.string("display_preference", default="4") == "0"
     opacity = 0.0 if hidden else node.number("opacity", default=1.0)
-    name = f"{owner.name}_{file.rsplit('.', 1)[0]}"
-    return Mesh(name, unnamed(frame), file, scale, color=(color[0], color[1], color[2]), opacity=opacity)
+    return Mesh("", unnamed(frame), file, scale, color=(color[0], color[1], color[2]), opacity=opacity)
 
 
-def _listed(visible: Node, places: Places, file: str, index: int) -> Mesh | None:
+def _listed(visible: Node, places: Places, file: str) -> Mesh | None:
     owner = _owner(visible) if visible.parent is None or visible.parent.tag not in FRAMES else visible.parent
     if owner is None or visible.parent is None or visible.parent.tag not in FRAMES:
         return None
     scale = visible.vector("scale_factors", size=3, default=(1.0, 1.0, 1.0))
-    return Mesh(f"{owner.name}_geom_{index + 1}", unnamed(places.of(owner)), file, scale)
+    return Mesh("", unnamed(places.of(owner)), file, scale)
 
 
 def read_contact_shape(node: Node, places: Places) -> ContactShape | None:
