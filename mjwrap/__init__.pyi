@@ -1,5 +1,6 @@
 """The public names, each with the module that it comes from: what `mjwrap.NAME` loads, and what type checkers read."""
 
+from . import osim as osim
 from .calibration import FiberFit as FiberFit
 from .calibration import Finding as Finding
 from .calibration import HillFit as HillFit
@@ -40,14 +41,19 @@ from .mjcf import muscle_xml as muscle_xml
 from .mjcf import set_laws as set_laws
 from .muscles import ActivationDynamics as ActivationDynamics
 from .muscles import DeGrooteFregly2016 as DeGrooteFregly2016
+from .muscles import Ligament as Ligament
 from .muscles import Millard2012 as Millard2012
 from .muscles import MuJoCoMuscle as MuJoCoMuscle
 from .muscles import PathActuator as PathActuator
+from .muscles import PathSpring as PathSpring
+from .muscles import Thelen2003 as Thelen2003
 from .muscles.bench import MuscleTrial as MuscleTrial
 from .muscles.bench import simulate_muscle as simulate_muscle
 from .muscles.energetics import Energetics as Energetics
 from .muscles.energetics import Umberger2010 as Umberger2010
 from .muscles.energetics import basal_power as basal_power
+from .osim.importing import Imported as Imported
+from .osim.importing import import_osim as import_osim
 from .paths import Contact as Contact
 from .paths import Obstacle as Obstacle
 from .paths import PathSolution as PathSolution

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hill_tables import shaped
 from numpy.typing import NDArray
 
 import mjwrap as mw
@@ -13,7 +14,11 @@ from mjwrap.muscles.energetics import Energetics, compute_energetics, metabolic_
 from mjwrap.muscles.laws import parameter_row
 
 Vector = NDArray[np.float64]
-EACH_LAW = pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])
+EACH_LAW = pytest.mark.parametrize(
+    "law",
+    [mw.DeGrooteFregly2016, mw.Millard2012, mw.Thelen2003, shaped],
+    ids=["DeGrooteFregly2016", "Millard2012", "Thelen2003", "shaped"],
+)
 SIZES = {  # F_max [N], l_o [m], l_s [m], pennation [rad]
     "parallel": (1000.0, 0.10, 0.20, 0.0),
     "soleus": (3549.0, 0.05, 0.25, 0.436),

@@ -125,7 +125,7 @@ class JointSpace:
         variables = np.zeros((len(muscles), self.k), dtype=np.bool_)
         held: list[tuple[str, ...]] = []
         for i, row in enumerate(joints):
-            led = [self._couplings.head(int(j)) for j in np.flatnonzero(row)]
+            led = [head for j in np.flatnonzero(row) for head in self._couplings.heads(int(j))]
             for joint in led:
                 variables[i, self._owner.get(joint, [])] = True
             still = [j for j in self.held if j in led]

@@ -1,4 +1,4 @@
-"""Run all checks of a model: at random poses from a cold start, along sweeps of every joint, in a short motion."""
+"""Run all checks of a model: at random poses from a cold start, along sweeps of every joint, in short motions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.checking.couplings import check_couplings
 from mjwrap.checking.differences import Neighbourhood, extrapolated_error, orders
 from mjwrap.checking.energy import check_energy
 from mjwrap.checking.forces import balance_check, evaluate_forces, power_check, work_check
@@ -35,7 +36,7 @@ def check_model(
     tendons: bool = False,
     progress: Progress | None = None,
 ) -> Checks:
-    """Check the paths, derivatives, forces, continuity and energy of a model's muscles.
+    """Check the paths, derivatives, forces, continuity and energy of a model's muscles, and its coupled joints.
 
     Actuators on spatial tendons that are not muscles are checked as strings that pull with a given force: what MuJoCo
     makes of their controls is not mjwrap's. The limits are the same for every model, and relative to its own sizes: a
@@ -100,9 +101,11 @@ def check_model(
     tell("energy", total - 1, total)
     energy = check_energy(model, maker.base, side_rule, tendons)
     coupled = len(maker.joints()) - len(free)
+    followed = check_couplings(model, maker.base, motion.qpos)
     facts = {"muscles": muscles.n, "random_poses": poses, "sweeps": len(sweeps), "poses_of_a_sweep": samples,
              "joints_that_follow": coupled, "cables": len(muscles.cables), "tendons": len(muscles.bare)}  # fmt: skip
-    return Checks([*paths.finish(), speed, arms, *forces, jumps, energy], facts)
+    last = [energy] if followed is None else [energy, followed]
+    return Checks([*paths.finish(), speed, arms, *forces, jumps, *last], facts)
 
 
 def _derivatives(

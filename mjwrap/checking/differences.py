@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.mjcf.conditional_points import routes_that_hold
 from mjwrap.poses.sizes import turning_dofs
 from mjwrap.system import MuscleSystem
 
@@ -35,14 +36,21 @@ class Neighbourhood:
     def _contacts(self) -> NDArray[np.int64]:
         return np.diff(self._muscles.contacts()[1])
 
+    def _switched(self) -> NDArray[np.bool_]:
+        """Return which muscles (n,) have other conditional points than at the pose itself."""
+        declared, model = self._muscles.declarations, self._muscles.model
+        before = routes_that_hold(model, declared, self._qpos)
+        after = routes_that_hold(model, declared, self._data.qpos)
+        return np.array([before.get(i) != after.get(i) for i in range(len(declared))])
+
     def _length(self, direction: Array, step: float) -> Array:
-        """Return lengths (n,) a step away; NaN if the path touches other surfaces there, or is not found."""
+        """Return lengths (n,) a step away; NaN if the path has other surfaces or points there, or is not found."""
         muscles, data = self._muscles, self._data
         data.qpos[:] = self._qpos
         mujoco.mj_integratePos(muscles.model, data.qpos, direction, step)
         muscles.set_branch(data, self._branch)
         muscles.forward(data)
-        other = self._bad | (muscles.status != 0) | (self._contacts() != self._touched)
+        other = self._bad | (muscles.status != 0) | (self._contacts() != self._touched) | self._switched()
         return np.where(other, np.nan, muscles.length)
 
     def central(self, direction: Array) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.outcome import Check
 from mjwrap.errors import ModelError, StateError
+from mjwrap.mjcf.conditional_points import routes_that_hold
 from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.system import CableSystem
 from mjwrap.text import counted
@@ -91,12 +92,15 @@ def _drift(
     data.qpos[:], data.act[:], muscles.excitation = qpos, ACTIVATION, np.full(muscles.n, ACTIVATION)
     data.ctrl[model.actuator_ctrladr[taken]] = ACTIVATION
     energy, power, moved, most = [], [], 0.0, 0.0
+    holding = routes_that_hold(model, muscles.declarations, qpos)
     for k in range(round(SECONDS / timestep) + 1):
         if k:
             muscles.step(data)
         muscles.forward(data)
         for i in np.flatnonzero(muscles.status):
             raise ModelError(f"'{muscles.names[i]}' has no path during the motion: {muscles.reason(int(i))}")
+        if routes_that_hold(model, muscles.declarations, data.qpos) != holding:
+            raise ModelError("a conditional path point comes or goes during the motion")
         each = -muscles.tension * muscles.velocity
         most = max(most, float(muscles.tension @ muscles.length))
         energy.append(_energy(model, data, scratch))

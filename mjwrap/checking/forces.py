@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mjwrap.checking.outcome import Check
 from mjwrap.mjcf import dof_names
 from mjwrap.system import MuscleSystem
+from mjwrap.system.point_forces import forces_on_joints
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def balance_check() -> Check:
 
 
 def power_check() -> Check:
-    """Return the check that the power of every muscle's forces is −F l̇."""
+    """Return the check that the power of every muscle's forces, those on joints that move its points too, is −F l̇."""
     return Check("power", "power of each muscle's forces is -F dl/dt", 1e-9, "of its parts")
 
 
@@ -39,11 +40,11 @@ def evaluate_forces(
     model = muscles.model
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
-    data.xfrc_applied[:] = 0.0
+    data.xfrc_applied[:], data.qfrc_applied[:] = 0.0, 0.0
     muscles.reset(data)
     muscles.apply(data)
     tension, velocity, names, good = muscles.tension, muscles.velocity, muscles.names, ~muscles.held
-    found, parts = np.zeros(model.nv), np.zeros(model.nv)
+    found, parts = data.qfrc_applied.copy(), np.abs(data.qfrc_applied)
     for body in np.flatnonzero(data.xfrc_applied.any(axis=1)):
         force, moment, each = data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:], np.zeros(model.nv)
         mujoco.mj_applyFT(model, data, force, moment, data.xipos[body], int(body), each)
@@ -60,7 +61,7 @@ def evaluate_forces(
             max(float(np.abs(forces.sum(axis=0)).max()) / tension[i], float(moment)), where, [names[i]]
         )
         speeds = np.array([_speed(model, data, body, point) for body, point, _ in pulls])
-        each = np.einsum("kj,kj->k", forces, speeds)
+        each = np.append(np.einsum("kj,kj->k", forces, speeds), forces_on_joints(muscles, int(i)) @ data.qvel)
         size = max(float(np.abs(each).sum()), 1e-9 * tension[i])
         power.see(abs(float(each.sum()) + tension[i] * velocity[i]) / size, where, [names[i]])
     muscles.reset(data)  # removes the forces

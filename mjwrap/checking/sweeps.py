@@ -71,6 +71,13 @@ class Sweeper:
         )
         self._jumps.count += muscles.n
         for i, (at, size, turn) in self._follower.jumps(place, trace, motion.turning):
+            beyond = 0.5 * beside
+            if self._follower.is_conditional_edge(place, i, at - beyond, at + beyond):
+                self._jumps.remarks.append(
+                    f"not counted: {muscles.names[i]} at {name} = {at:.6f}: conditional edge: a path point comes or "
+                    f"goes; length {1e3 * size:+.3f} mm, moment arm {-1e3 * turn:+.3f} mm"
+                )
+                continue
             cause = "" if size else self._follower.moment_arm_break(place, trace, i, at)
             if cause:
                 self._jumps.remarks.append(

@@ -8,6 +8,7 @@ may be
   SITE                         a point of the path
   GEOM                         a surface to wrap: a cylinder, sphere, ellipsoid or capsule
   GEOM:SITE                    a surface that the path touches near a site, its hint
+  GEOM:side=SITE               a surface that the path passes on the side of a site, at every pose
   GEOM@SHAPE=SIZE/SIZE         the geom's frame with another surface: torus=MAJOR/MINOR and others [m]
   GEOM@SHAPE=SIZE/SIZE:SITE    the same with a hint
   GEOM@finite                  a cylinder geom as long as it is drawn

@@ -16,6 +16,7 @@ from mjwrap.poses.ties import KINK, TIE
 from mjwrap.text import counted
 
 BOTH = "the path that both have found bends"
+EDGE = "a conditional path point comes or goes"
 AS_MUCH = 1e-3  # largest difference of two jumps that are the same, as a share of their size
 SAME_PLACE = 1e-6  # largest distance of one jump from itself, as a share of the sweep's range
 
@@ -36,7 +37,8 @@ class Jump:
         base: number of the pose around which the joint was swept.
         other_smooth: whether the other program had a path there that did not jump.
         alone: whether a coupled joint was moved alone, which no motion of the model does.
-        cause: why no path has a continuous moment arm there, of either program; empty for all other jumps.
+        cause: why no path has a continuous moment arm there, of either program, or that a conditional path point
+            comes or goes; empty for all other jumps.
     """
 
     program: str
@@ -70,7 +72,11 @@ def find_jumps(comparer: Comparer, poses: PoseMaker, batch: Batch, joint: int, a
         for program, jump in told:
             before, after, cause = _sides(comparer, pair, program, place, jump[0], span)
             told_as = program, pair.name, motion.name, *jump, before, after, motion.base
-            found.append(Jump(*told_as, alone=motion.alone, cause="" if jump[1] else cause))
+            beside = NARROW * span
+            ends = jump[0] - beside, jump[0] + beside
+            edge = program == "mjwrap" and comparer.follower.is_conditional_edge(place, pair.index, *ends)
+            cause = EDGE if edge else "" if jump[1] else cause
+            found.append(Jump(*told_as, alone=motion.alone, cause=cause))
     found = [replace(jump, cause=jump.cause or _shared(jump, found, span)) for jump in found]
     return [_with_other_smooth(jump, found, batch) for jump in found]
 

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import MjwrapError
 from mjwrap.mjcf import dof_names, name_of
+from mjwrap.mjcf.moving_points import is_muscle_tuple
 from mjwrap.model.takeover import Takeover
 from mjwrap.runs.excitation import Excitation
 from mjwrap.system import CableSystem, MuscleSystem
+from mjwrap.system.pieces import PieceSwitch
 from mjwrap.text import counted
 
 Array = NDArray[np.float64]
@@ -99,11 +101,12 @@ def with_native_laws(model: mujoco.MjModel) -> tuple[mujoco.MjModel, list[str]]:
             for r in rows
             if int(model.tuple_objtype[r]) == int(mujoco.mjtObj.mjOBJ_ACTUATOR)
         ]
-        if "mjwrap" not in name_of(model, mujoco.mjtObj.mjOBJ_TUPLE, i) or not actuators:
+        if not is_muscle_tuple(name_of(model, mujoco.mjtObj.mjOBJ_TUPLE, i)) or not actuators:
             continue
         if int(model.actuator_gaintype[actuators[0]]) != int(mujoco.mjtGain.mjGAIN_MUSCLE):
             continue
-        kept = [r for r in rows if int(model.tuple_objtype[r]) not in dropped]
+        ranges = [r + 1 for r in rows if int(model.tuple_objtype[r]) == int(mujoco.mjtObj.mjOBJ_JOINT)]
+        kept = [r for r in rows if int(model.tuple_objtype[r]) not in dropped or r in ranges]
         if len(kept) == len(rows):
             continue
         for field in (model.tuple_objtype, model.tuple_objid, model.tuple_objprm):
@@ -141,7 +144,7 @@ def compare_motion(
     """
     native_model, driven_model = pristine(model), pristine(model)
     muscles = CableSystem(driven_model, side_rule=side_rule)
-    excitation = Excitation(muscles, entries, seed)
+    excitation, pieces = Excitation(muscles, entries, seed), PieceSwitch(native_model)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):
         if key >= 0:
@@ -152,7 +155,7 @@ def compare_motion(
     for _ in range(round(duration / float(model.opt.timestep))):
         excitation.write(native, own=False)
         excitation.write(driven)
-        mujoco.mj_step(native_model, native)
+        pieces.step(native)
         try:
             if unstable(native):
                 stopped = f"MuJoCo's own run became unstable at {times[-1]:g} s"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from mjwrap.comparison.judge_geodesic import Fault
-from mjwrap.comparison.jumps import Jump
+from mjwrap.comparison.jumps import EDGE, Jump
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.poses.ties import KINK, TIE
 from mjwrap.text import counted
@@ -105,6 +105,10 @@ def _breaks(summary: MuscleSummary, jumps: Sequence[Jump]) -> list[str]:
     for cause in dict.fromkeys(jump.cause for jump in jumps):
         here = [jump for jump in jumps if jump.cause == cause]
         who = " and ".join(p for p in ("MuJoCo", "mjwrap") if any(jump.program == p for jump in here))
+        if cause == EDGE:
+            size = 1e3 * max(abs(jump.length) for jump in here)
+            found.append(f"the length of {who} jumps by up to {size:.3g} mm where {cause}: that is no fault")
+            continue
         arm = 1e3 * max(abs(jump.slope) for jump in here)
         found.append(
             f"the moment arm (not the length) of {who} jumps by up to {arm:.3g} mm where {cause}: that is no fault"

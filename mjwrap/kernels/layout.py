@@ -7,7 +7,7 @@ this order:
     KIND        VIA, CYLINDER, SPHERE, ...
     DIM   (4)   sizes of the surface, as listed at its kind below; lengths in [m]
     SIZE        about the smallest radius of curvature; limits steps on the surface, and scales tolerances [m]
-    TRAITS      properties of the surface, as a sum of the bits below
+    TRAITS      properties of the surface and of the row, as a sum of the bits below
     Z_LIMIT     half length along local z beyond which a contact is out of range [m]; infinite where there is none
     POS   (3)   position of the surface frame S (or of the via point) in the world W [m]
     ROT   (9)   R_WS, row-major
@@ -19,8 +19,9 @@ this order:
 
 The columns KIND to Z_LIMIT, which are read most often, fill the row's first cache line.
 
-Only `mjwrap/surfaces/rows.py` fills the columns of a surface, from the surface's class. Kernels ask for traits
-(`geometry/traits.py`); only `geometry/dispatch.py` and `wraps/single.py` compare kinds.
+Only `mjwrap/surfaces/rows.py` fills the columns of a surface, from the surface's class; of the traits only SIDED comes
+from the obstacle. Kernels ask for traits (`geometry/traits.py`); only `geometry/dispatch.py` and `wraps/single.py`
+compare kinds.
 
 Surfaces with several contacts. A string may touch a surface with hollows more than once. Such a surface has as many
 consecutive rows as its class says (`touches`). They are equal in all columns except TOUCH, which counts 0, 1, 2, ...,
@@ -61,6 +62,7 @@ HOLLOW = 4  # a straight segment that is tangent to the surface may enter it els
 ONE_SIDED = 8  # between two points there is at most one stable wrap, so that no hint or search is needed
 RANDOM_STARTS = 16  # a cold start may try hints at random places, at distance SIZE from its origin
 ELLIPSE_SECTIONS = 32  # an ellipsoid with semi-axes DIM, so that plane sections are ellipses
+SIDED = 64  # the path passes on the side of the hint at every pose; of the first row of a surface (`wraps/sides.py`)
 
 # ------------------------------------- values of INSIDE: the solid inside which a string is held; 0: none
 ABOUT_POINT = 1.0  # a sphere

@@ -8,6 +8,7 @@ from mjwrap.mjcf.actuators import ACTEARLY_DYNAMICS, is_muscle, keeps_state
 from mjwrap.mjcf.bare_tendons import tendon_declarations
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration, Node, Route
 from mjwrap.mjcf.loading import is_binary, read_model, read_spec, with_remedy
+from mjwrap.mjcf.moving_points import MovingAxis, read_moving_axes
 from mjwrap.mjcf.muscle_text import insert_xml, muscle_xml
 from mjwrap.mjcf.names import act_names, dof_names, has_plugin, name_of, names, qpos_names
 from mjwrap.mjcf.reader import read_declarations
@@ -17,6 +18,7 @@ from mjwrap.mjcf.writing import set_laws
 __all__ = [
     "ACTEARLY_DYNAMICS",
     "Declarations",
+    "MovingAxis",
     "MuscleDeclaration",
     "Node",
     "Route",
@@ -33,6 +35,7 @@ __all__ = [
     "qpos_names",
     "read_declarations",
     "read_model",
+    "read_moving_axes",
     "read_spec",
     "set_laws",
     "tendon_declarations",

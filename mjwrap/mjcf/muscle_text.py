@@ -26,11 +26,13 @@ from mjwrap.mjcf.parameters import (
     TENDON,
     TIMES,
     choose_law,
+    law_arguments,
 )
 from mjwrap.mjcf.route_text import FINITE, Stop, read_route
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles.activation import FORMS
-from mjwrap.muscles.laws import TENDONS, MuJoCoMuscle
+from mjwrap.muscles import laws
+from mjwrap.muscles.laws import PASSIVE_LAWS, TENDONS, MuJoCoMuscle
 
 OBJ = mujoco.mjtObj
 NATIVE = ("lengthrange", "force", "range", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax", "timeconst")
@@ -65,15 +67,17 @@ def muscle_xml(
         model: the compiled model, in which the names are looked up.
         name: name of the muscle.
         route: stops in order, separated by commas. The first and the last are sites; other sites are via points. A geom
-            may have a hint, GEOM:SITE, near which the path touches it; GEOM@SHAPE=SIZE/SIZE gives it another shape,
-            with sizes [m] as in docs/declaring.md; GEOM@finite wraps a cylinder geom as long as it is drawn. Where a
-            site and a geom have the same name, write site/NAME or geom/NAME.
-        law: "degroote_fregly_2016", "millard_2012", "mujoco" or "path_actuator"; None for the one whose parameters
-            are given.
+            may have a hint, GEOM:SITE, near which the path touches it, or a side, GEOM:side=SITE, on which the path
+            passes it at every pose; GEOM@SHAPE=SIZE/SIZE gives it another shape, with sizes [m] as in
+            docs/declaring.md; GEOM@finite wraps a cylinder geom as long as it is drawn. Where a site and a geom have
+            the same name, write site/NAME or geom/NAME.
+        law: "degroote_fregly_2016", "millard_2012", "thelen_2003", "mujoco", "path_actuator", "ligament" or
+            "path_spring"; None for the one whose parameters are given.
         parameters: of the law, by the names of docs/declaring.md, such as max_isometric_force, and "tendon_model" and
             "activation_dynamics". For the law "mujoco", attributes of `<muscle>`, lengthrange among them.
         actuator: an actuator of the model that drives the muscle; None for a new one, with a tendon of its own.
-        driven: whether the muscle has an actuator; without one its excitation is set in Python.
+        driven: whether the muscle has an actuator; without one its excitation is set in Python. Ligaments and springs
+            have none.
 
     Returns:
         The text; numbers have all their digits.
@@ -170,9 +174,12 @@ def _check_law(
         )
     if words.get(DYNAMICS, next(iter(FORMS))) not in FORMS:
         raise ModelError(f"muscle '{name}': {DYNAMICS} must be one of {listed(FORMS)}")
+    if laws.LAWS[law] in PASSIVE_LAWS and driven:
+        raise ModelError(f"muscle '{name}': law '{law}' is passive and needs no actuator: say driven=False")
     if law in FIBER_LAWS:  # a ModelError says what is wrong with a value
-        values = {k: v[0] for k, v in numbers.items() if k not in (TIMES, SMOOTHING)}
-        FIBER_LAWS[law](**values, tendon=words.get(TENDON, TENDONS[0]))  # pyright: ignore[reportArgumentType]
+        FIBER_LAWS[law](**law_arguments(numbers), tendon=words.get(TENDON, TENDONS[0]))
+    elif not own:
+        laws.LAWS[law](**law_arguments(numbers))
 
 
 def _check_names(model: mujoco.MjModel, name: str, actuator: str | None, driven: bool) -> None:
@@ -241,7 +248,9 @@ def _text(muscle: _Muscle) -> str:
             custom.append(_element("numeric", name=numeric, data=_digits(stop.sizes)))
             elements.append(_element("element", objtype="numeric", objname=numeric))
         if stop.hint:
-            elements.append(_element("element", objtype="site", objname=stop.hint, prm="1"))
+            elements.append(
+                _element("element", objtype="site", objname=stop.hint, prm="2" if stop.side else "1")
+            )
     for key, values in muscle.numbers.items():
         if key in NUMERICS:
             custom.append(_element("numeric", name=f"mjwrap_{name}_{key}", data=_digits(values)))

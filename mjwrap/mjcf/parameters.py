@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -13,7 +14,15 @@ from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles import laws
 from mjwrap.muscles.activation import FORMS, ActivationDynamics
-from mjwrap.muscles.laws import TENDONS, ActuatorForce, FiberLaw, Law, MuJoCoMuscle
+from mjwrap.muscles.laws import (
+    PASSIVE_LAWS,
+    SEVERAL,
+    TENDONS,
+    ActuatorForce,
+    FiberLaw,
+    Law,
+    MuJoCoMuscle,
+)
 from mjwrap.text import counted
 
 OBJ = mujoco.mjtObj
@@ -47,9 +56,10 @@ def read_numerics(model: mujoco.MjModel, ids: list[int]) -> Given:
             raise ModelError(f"{fits[0]} is given twice, the second time by numeric '{name}'")
         first = int(model.numeric_adr[i])
         values = [float(x) for x in model.numeric_data[first : first + int(model.numeric_size[i])]]
-        wanted = 2 if fits[0] == TIMES else 1
-        if len(values) != wanted:
-            raise ModelError(f"numeric '{name}' must have {counted(wanted, 'value')}, not {len(values)}")
+        counts = SEVERAL.get(fits[0], (2 if fits[0] == TIMES else 1,))
+        if counts and len(values) not in counts:
+            wanted = " or ".join([*map(str, counts[:-1]), counted(counts[-1], "value")])
+            raise ModelError(f"numeric '{name}' must have {wanted}, not {len(values)}")
         given[fits[0]] = values
     return given
 
@@ -72,11 +82,21 @@ def read_texts(model: mujoco.MjModel, ids: list[int]) -> dict[str, str]:
     return given
 
 
+def law_arguments(given: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+    """Return the arguments of a law's dataclass from the numbers of its parameters."""
+    return {
+        key: tuple(values) if key in SEVERAL else values[0]
+        for key, values in given.items()
+        if key not in (TIMES, SMOOTHING)
+    }
+
+
 def choose_law(given: Given) -> str:
     """Return the law whose parameters are given, for a tuple that names no law; without parameters MuJoCo's."""
-    for law, (needed, _) in LAWS.items():
-        if any(key in given for key in needed):
-            return law
+    for enough in (all, any):
+        for law, (needed, _) in LAWS.items():
+            if needed and enough(key in given for key in needed):
+                return law
     return "mujoco"
 
 
@@ -99,7 +119,7 @@ def build_law(
         raise ModelError(
             f"law '{law}' has no parameter {listed(unused)}; it has: {listed((*needed, *other))}"
         )
-    values: dict[str, Any] = {key: value[0] for key, value in given.items() if key not in (TIMES, SMOOTHING)}
+    values = law_arguments(given)
     if law in FIBER_LAWS:
         found = FIBER_LAWS[law](**values) if tendon is None else FIBER_LAWS[law](**values, tendon=tendon)
         if found.states == 2 and actuator >= 0 and not keeps_state(model, actuator):
@@ -112,6 +132,8 @@ def build_law(
         raise ModelError(
             f"law '{law}' has no tendon; {TENDON} ({listed(TENDONS)}) is only for the laws {listed(FIBER_LAWS)}"
         )
+    if laws.LAWS[law] in PASSIVE_LAWS and actuator >= 0:
+        raise ModelError(f"law '{law}' is passive, so that its tuple must have no actuator")
     if law != MuJoCoMuscle.law:  # its parameters are those of the actuator
         return laws.LAWS[law](**values)
     if native and actuator >= 0:

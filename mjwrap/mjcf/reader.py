@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 
 from mjwrap.errors import ModelError, VersionError
 from mjwrap.mjcf.actuators import is_muscle, mujoco_law, native_reason, path_reason, pulled_tendon
 from mjwrap.mjcf.declarations import Declarations, MuscleDeclaration
 from mjwrap.mjcf.inside import reference_pose, shares_inside
+from mjwrap.mjcf.moving_points import MovingSite, read_moving_axes
 from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.routes import build_routes, tendon_stops
 from mjwrap.mjcf.side_rules import choose_side_rule
+from mjwrap.mjcf.tuple_names import declares_muscle
 from mjwrap.mjcf.tuples import read_tuple
 from mjwrap.muscles.laws import ActuatorForce
 
@@ -56,13 +60,26 @@ def read_declarations(
                 f"the same muscle, list the actuator in the tuple"
             )
         taken.append(muscle.name)
-    return Declarations(muscles + free, native, rule)
+    moving: dict[int, MovingSite] = {}
+    for axis in read_moving_axes(model):
+        known = moving[axis.site].joints if axis.site in moving else ()
+        moving[axis.site] = MovingSite(axis.site, tuple(dict.fromkeys((*known, axis.joint))))
+    return Declarations([_with_moving_sites(muscle, moving) for muscle in muscles + free], native, rule)
+
+
+def _with_moving_sites(muscle: MuscleDeclaration, moving: dict[int, MovingSite]) -> MuscleDeclaration:
+    """Return a muscle whose routes say which of their sites move within their bodies."""
+    found = [tuple(moving[s] for s in dict.fromkeys(route.sites) if s in moving) for route in muscle.routes]
+    if not any(found):
+        return muscle
+    routes = tuple(replace(route, moving=sites) for route, sites in zip(muscle.routes, found, strict=True))
+    return replace(muscle, routes=routes)
 
 
 def _read_tuples(
     model: mujoco.MjModel, rest: mujoco.MjData, by_mujoco: tuple[bool, bool], side_rule: int
 ) -> tuple[dict[int, MuscleDeclaration], list[MuscleDeclaration]]:
-    """Return the muscles of all mjwrap tuples: by actuator, and those without one.
+    """Return the muscles of all tuples that declare one: by actuator, and those without one.
 
     by_mujoco: whether MuJoCo computes the forces of its muscles, and of other actuators.
     """
@@ -71,7 +88,7 @@ def _read_tuples(
     free: list[MuscleDeclaration] = []
     for index in range(model.ntuple):
         tuple_name = name_of(model, OBJ.mjOBJ_TUPLE, index)
-        if "mjwrap" not in tuple_name:
+        if not declares_muscle(tuple_name):
             continue
         muscle = read_tuple(model, rest, index, by_mujoco, side_rule)
         if muscle.actuator < 0:

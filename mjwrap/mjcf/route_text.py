@@ -15,21 +15,27 @@ from mjwrap.mjcf.wrapping_geoms import SIZES
 OBJ = mujoco.mjtObj
 SHAPES = {key.removesuffix("_size"): sizes for key, sizes in SIZES.items()}
 FINITE = "finite"
+SIDE = "side="  # before the site of a hint: it holds at every pose
 ROUTE_FORMS = (
     "SITE, GEOM, GEOM:HINT, GEOM@finite, GEOM@SHAPE=SIZE/SIZE or GEOM@SHAPE=SIZE/SIZE:HINT, separated by commas; "
+    "side=HINT instead of HINT holds the side at every pose; "
     f"shapes: {', '.join(SHAPES)}"
 )
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A stop of a route: the name of a site or geom, and of a geom its hint, shape and sizes [m]."""
+    """A stop of a route: the name of a site or geom, and of a geom its hint, shape and sizes [m].
+
+    side: the hint is a side that holds at every pose.
+    """
 
     kind: str  # "site" or "geom"
     name: str
     hint: str = ""
     shape: str = ""
     sizes: tuple[float, ...] = ()
+    side: bool = False
 
 
 def read_route(model: mujoco.MjModel, route: str) -> list[Stop]:
@@ -70,9 +76,13 @@ def _read_stop(model: mujoco.MjModel, word: str) -> Stop:
         wanted = {"site": sites, "geom": geoms}.get(kind, [*sites, *geoms])
         what = kind or "site or geom"
         raise ModelError(f"'{word}': the model has no {what} '{name}'; {_near(name, wanted, 'there are')}")
-    if hint and hint not in sites:
-        raise ModelError(f"'{word}': the hint '{hint}' is not a site; {_near(hint, sites, 'sites')}")
-    return Stop("geom", name, hint, shape, sizes)
+    side = hint not in sites and hint.startswith(SIDE)
+    hint = hint.removeprefix(SIDE) if side else hint
+    if (hint or side) and hint not in sites:
+        raise ModelError(
+            f"'{word}': the {'side' if side else 'hint'} '{hint}' is not a site; {_near(hint, sites, 'sites')}"
+        )
+    return Stop("geom", name, hint, shape, sizes, side)
 
 
 def _read_shape(word: str, text: str) -> tuple[str, tuple[float, ...]]:

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import mujoco
 
 from mjwrap.errors import ModelError
+from mjwrap.mjcf.conditional_points import MOST, JointRange, Presence, TooManyAlternatives, alternatives
 from mjwrap.mjcf.declarations import Node, Route
 from mjwrap.mjcf.inside import end_is_inside, is_beside, side_is_inside
 from mjwrap.mjcf.names import listed, name_of, names
@@ -21,7 +22,8 @@ class Stop(NamedTuple):
     """One element of a list of stops: id of a site, geom, hint (a site) or sizes (a numeric), or a pulley's divisor.
 
     finite: a cylinder geom has the length with which it is drawn, not an infinite one. inside: the string must meet the
-    geom's solid. turn: of a hint, see `Node`.
+    geom's solid. turn: of a hint, see `Node`. side: the hint is a side that holds at every pose. ranges: a site
+    belongs to the path only where all of them hold.
     """
 
     kind: Literal["site", "geom", "hint", "sizes", "pulley"]
@@ -30,6 +32,8 @@ class Stop(NamedTuple):
     finite: bool = False
     inside: bool = False
     turn: float = 0.0
+    side: bool = False
+    ranges: tuple[JointRange, ...] = ()
 
 
 class _Place(NamedTuple):
@@ -41,6 +45,7 @@ class _Place(NamedTuple):
     inside: bool = False
     hint: int = -1
     turn: float = 0.0
+    side: bool = False
     sizes: int = -1
 
 
@@ -90,7 +95,10 @@ def geoms_of(stops: list[Stop]) -> list[tuple[int, int, tuple[int, int]]]:
 
 
 def build_routes(model: mujoco.MjModel, muscle: str, stops: Iterable[Stop]) -> tuple[Route, ...]:
-    """Return the routes of a list of stops, one per piece between pulleys; `ModelError` for a wrong list."""
+    """Return the routes of a list of stops; `ModelError` for a wrong list.
+
+    There is one for each piece between pulleys, or, with conditional points, one for each combination of these.
+    """
     stretches: list[tuple[float, list[Stop]]] = [(1.0, [])]
     for stop in stops:
         if stop.kind != "pulley":
@@ -99,13 +107,35 @@ def build_routes(model: mujoco.MjModel, muscle: str, stops: Iterable[Stop]) -> t
             stretches.append((1.0 / stop.divisor, []))
         else:
             raise ModelError(f"muscle '{muscle}': pulley divisor {stop.divisor} must be positive")
-    routes = tuple(_build_route(model, muscle, stretch, weight) for weight, stretch in stretches if stretch)
+    routes = tuple(
+        route for weight, stretch in stretches if stretch for route in _pieces(model, muscle, stretch, weight)
+    )
     if not routes:
         raise ModelError(f"muscle '{muscle}': its path has no sites; sites: {_list_sites(model)}")
     return routes
 
 
-def _build_route(model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: float) -> Route:
+def _pieces(model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: float) -> list[Route]:
+    """Return the alternatives of a piece of string, one for each combination of its conditional points."""
+    points = list(dict.fromkeys(stop.ranges for stop in stops if stop.ranges))
+    try:
+        found = alternatives(points)
+    except TooManyAlternatives as error:
+        raise ModelError(
+            f"muscle '{muscle}': its {len(points)} conditional points have {error.count} combinations, each of them "
+            f"a path of its own; at most {MOST} are possible"
+        ) from None
+    routes: list[Route] = []
+    for when in found:
+        absent = {presence.ranges for presence in when if not presence.holds}
+        kept = [stop for stop in stops if stop.ranges not in absent]
+        routes.append(_build_route(model, muscle, kept, weight, when))
+    return routes
+
+
+def _build_route(
+    model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: float, when: tuple[Presence, ...]
+) -> Route:
     places: list[_Place] = []
     for stop in stops:
         if stop.kind == "site":
@@ -117,23 +147,24 @@ def _build_route(model: mujoco.MjModel, muscle: str, stops: list[Stop], weight: 
     if len(places) < 2 or places[0].site < 0 or places[-1].site < 0:
         path = ", ".join(_describe(model, place) for place in places)
         raise ModelError(
-            f"muscle '{muscle}': its path must begin and end with a site, two at least; it is: {path}; "
-            f"sites: {_list_sites(model)}"
+            f"muscle '{muscle}': its path must begin and end with a site, two at least; it is: {path}"
+            f"{', where its conditional points are absent' * bool(when)}; sites: {_list_sites(model)}"
         )
     nodes = tuple(_node(model, muscle, place) for place in places[1:-1])
-    return Route(places[0].site, nodes, places[-1].site, weight)
+    return Route(places[0].site, nodes, places[-1].site, weight, when)
 
 
 def _completed(model: mujoco.MjModel, muscle: str, place: _Place | None, stop: Stop) -> _Place:
     """Return a geom's place with a hint or sizes added."""
     if place is not None and place.geom >= 0:
         if stop.kind == "hint" and place.hint < 0:
-            return place._replace(hint=stop.index, turn=stop.turn)
+            return place._replace(hint=stop.index, turn=stop.turn, side=stop.side)
         if stop.kind == "sizes" and place.sizes < 0:
             return place._replace(sizes=stop.index)
     before = _describe(model, place) if place else "nothing"
     if stop.kind == "hint":
-        what = f"site '{name_of(model, OBJ.mjOBJ_SITE, stop.index)}' is marked as a hint (prm=1) and"
+        mark = "side (prm=2)" if stop.side else "hint (prm=1)"
+        what = f"site '{name_of(model, OBJ.mjOBJ_SITE, stop.index)}' is marked as a {mark} and"
     else:
         what = f"numeric '{name_of(model, OBJ.mjOBJ_NUMERIC, stop.index)}' declares a surface and"
     raise ModelError(
@@ -155,13 +186,21 @@ def _node(model: mujoco.MjModel, muscle: str, place: _Place) -> Node:
         inside=place.inside,
         sizes=place.sizes,
         turn=place.turn,
+        side=place.side,
     )
 
 
 def _describe(model: mujoco.MjModel, place: _Place) -> str:
     if place.geom < 0:
         return f"site '{name_of(model, OBJ.mjOBJ_SITE, place.site)}'"
-    said = [word for word, given in (("a hint", place.hint >= 0), ("sizes", place.sizes >= 0)) if given]
+    said = [
+        word
+        for word, given in (
+            ("a side" if place.side else "a hint", place.hint >= 0),
+            ("sizes", place.sizes >= 0),
+        )
+        if given
+    ]
     return f"geom '{name_of(model, OBJ.mjOBJ_GEOM, place.geom)}'" + " with " * bool(said) + " and ".join(said)
 
 

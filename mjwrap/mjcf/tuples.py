@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import mujoco
 
 from mjwrap.errors import ModelError
+from mjwrap.mjcf.active_ranges import WORD as ACTIVE_RANGE
+from mjwrap.mjcf.active_ranges import read_active_range
 from mjwrap.mjcf.actuators import is_fixed, is_muscle, pulled_tendon, unfit_reason
-from mjwrap.mjcf.declarations import MuscleDeclaration
+from mjwrap.mjcf.declarations import MuscleDeclaration, Route
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.mjcf.parameters import (
     DYNAMICS,
@@ -24,12 +26,18 @@ from mjwrap.mjcf.parameters import (
 )
 from mjwrap.mjcf.routes import Stop, build_routes, tendon_stops
 from mjwrap.mjcf.side_rules import AUTHORS
+from mjwrap.mjcf.tuple_names import COUPLING
 from mjwrap.mjcf.wrapping_geoms import size_keys
+from mjwrap.surfaces.rows import side_fault
 
 OBJ = mujoco.mjtObj
 MARKS = {
-    OBJ.mjOBJ_SITE: ("site", "0 makes it a stop of the path, 1 the hint of the geom before"),
-    OBJ.mjOBJ_GEOM: ("geom", "0 wraps an infinite cylinder, 1 a cylinder as long as it is drawn"),
+    OBJ.mjOBJ_SITE: (
+        "site",
+        2,
+        "0 makes it a stop of the path, 1 the hint and 2 the side of the geom before",
+    ),
+    OBJ.mjOBJ_GEOM: ("geom", 1, "0 wraps an infinite cylinder, 1 a cylinder as long as it is drawn"),
 }
 
 
@@ -78,6 +86,7 @@ def read_tuple(
             raise ModelError(f"tuple '{tuple_name}': it has neither sites nor a tendon with sites")
         stops = tendon_stops(model, rest, tendon, side_rule)
     routes = build_routes(model, name, stops)
+    _check_sides(model, rest, name, routes)
     try:
         given = read_numerics(model, found.numerics)
         texts = read_texts(model, found.texts)
@@ -93,23 +102,55 @@ def read_tuple(
     return MuscleDeclaration(name, routes, parameters, actuator, tendon, dynamics)
 
 
+def _check_sides(model: mujoco.MjModel, rest: mujoco.MjData, muscle: str, routes: tuple[Route, ...]) -> None:
+    """Raise a `ModelError` for a side that says no half: a site on the axis of its geom, or in its middle."""
+    for node in (node for route in routes for node in route.nodes if node.side and node.surface is not None):
+        turned = rest.geom_xmat[node.geom].reshape(3, 3)
+        fault = side_fault(
+            node.surface, turned.T @ (rest.site_xpos[node.hint_site] - rest.geom_xpos[node.geom])
+        )
+        if fault:
+            raise ModelError(
+                f"muscle '{muscle}': site '{name_of(model, OBJ.mjOBJ_SITE, node.hint_site)}', the side (prm=2) of geom "
+                f"'{name_of(model, OBJ.mjOBJ_GEOM, node.geom)}', lies {fault} of the geom and so says no side; move it "
+                "to where the muscle passes"
+            )
+
+
 def _collect(model: mujoco.MjModel, index: int) -> _Elements:
     found = _Elements()
     first = int(model.tuple_adr[index])
-    for j in range(first, first + int(model.tuple_size[index])):
+    end = first + int(model.tuple_size[index])
+    after_site, ranged = False, -1  # whether a range may follow; the numeric of the last range
+    for j in range(first, end):
         kind, item, prm = (
             OBJ(int(model.tuple_objtype[j])),
             int(model.tuple_objid[j]),
             float(model.tuple_objprm[j]),
         )
+        if j == ranged:
+            continue
+        if kind == OBJ.mjOBJ_JOINT:
+            if not after_site:
+                name = name_of(model, kind, item)
+                raise ModelError(
+                    f"joint '{name}' must directly follow a site of the path, whose {ACTIVE_RANGE} it has"
+                )
+            site = found.stops[-1]
+            ranged = j + 1
+            each = read_active_range(model, item, ranged if ranged < end else -1)
+            found.stops[-1] = site._replace(ranges=(*site.ranges, each))
+            continue
+        after_site = kind == OBJ.mjOBJ_SITE and prm == 0.0
         if kind == OBJ.mjOBJ_ACTUATOR:
             found.actuators.append(item)
         elif kind == OBJ.mjOBJ_TENDON:
             found.tendons.append(item)
         elif kind == OBJ.mjOBJ_SITE:
-            found.stops.append(Stop("hint" if _is_marked(model, kind, item, prm) else "site", item))
+            mark = _mark(model, kind, item, prm)
+            found.stops.append(Stop("hint" if mark else "site", item, side=mark == 2))
         elif kind == OBJ.mjOBJ_GEOM:
-            found.stops.append(Stop("geom", item, finite=_is_marked(model, kind, item, prm)))
+            found.stops.append(Stop("geom", item, finite=_mark(model, kind, item, prm) == 1))
         elif kind == OBJ.mjOBJ_NUMERIC and size_keys(name_of(model, kind, item)):
             _check_size_name(name_of(model, kind, item))
             found.stops.append(Stop("sizes", item))
@@ -119,9 +160,11 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
             found.texts.append(item)
         else:
             what = kind.name.removeprefix("mjOBJ_").lower()
+            pieces = kind == OBJ.mjOBJ_EQUALITY
+            hint = f"; the pieces of a coupling are in a tuple '{COUPLING}JOINT'" if pieces else ""
             raise ModelError(
-                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, or "
-                f"a text whose name contains one of: {listed(TEXTS)}"
+                f"{what} '{name_of(model, kind, item)}' cannot be used; use actuator, tendon, site, geom, numeric, "
+                f"or a text whose name contains one of: {listed(TEXTS)}{hint}"
             )
     _at_most_one(model, OBJ.mjOBJ_ACTUATOR, found.actuators)
     _at_most_one(model, OBJ.mjOBJ_TENDON, found.tendons)
@@ -131,12 +174,12 @@ def _collect(model: mujoco.MjModel, index: int) -> _Elements:
     return found
 
 
-def _is_marked(model: mujoco.MjModel, kind: mujoco.mjtObj, item: int, prm: float) -> bool:
-    """Return whether a site or geom has prm=1."""
-    if prm not in (0.0, 1.0):
-        what, meaning = MARKS[kind]
+def _mark(model: mujoco.MjModel, kind: mujoco.mjtObj, item: int, prm: float) -> int:
+    """Return the prm of a site or geom, one of those that have a meaning."""
+    what, most, meaning = MARKS[kind]
+    if prm not in range(most + 1):
         raise ModelError(f"{what} '{name_of(model, kind, item)}' has prm={prm:g}; {meaning}")
-    return prm == 1.0
+    return int(prm)
 
 
 def _check_size_name(name: str) -> None:

@@ -20,9 +20,10 @@ from mjwrap.mjcf.parameters import (
     TEXTS,
     TIMES,
 )
+from mjwrap.mjcf.tuple_names import declares_muscle
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles.activation import ActivationDynamics
-from mjwrap.muscles.laws import FiberLaw
+from mjwrap.muscles.laws import SEVERAL, FiberLaw
 
 OBJ = mujoco.mjtObj
 
@@ -52,7 +53,7 @@ def set_laws(
     validation.instance(laws, Mapping, "laws", ModelError, "a dict of laws by the name of the muscle")
     validation.optional(dynamics, ActivationDynamics, "dynamics", ModelError, "an ActivationDynamics")
     actuators = {actuator.name: actuator for actuator in spec.actuators}
-    tuples = {entry.name: entry for entry in spec.tuples if "mjwrap" in entry.name}
+    tuples = {entry.name: entry for entry in spec.tuples if declares_muscle(entry.name)}
     by_actuator = {_actuator_of(entry): entry for entry in tuples.values()}
     free = {name.replace("mjwrap_", ""): e for name, e in tuples.items() if not _actuator_of(e)}
     unknown = [name for name in laws if name not in actuators and name not in free]
@@ -169,7 +170,11 @@ def _write(
 ) -> None:
     """Replace a tuple's parameters by those of a law."""
     given = {key: getattr(law, key, None) for key in (*law.needs, *law.takes)}
-    numerics = {key: [float(value)] for key, value in given.items() if value is not None}
+    numerics = {
+        key: [float(x) for x in (value if key in SEVERAL else [value])]
+        for key, value in given.items()
+        if value is not None
+    }
     texts = {LAW: law.law, TENDON: law.tendon}
     if dynamics is not None:
         up, down, smoothing = dynamics.row()

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
-from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.coupling import muscle_paths, path_points
 from mjwrap.kernels.coupling.groups import Routes
 from mjwrap.kernels.musculotendon import dispatch, dynamics
 from mjwrap.kernels.musculotendon.groups import Muscles
 from mjwrap.mjcf import ACTEARLY_DYNAMICS, MuscleDeclaration, Node, keeps_state
+from mjwrap.model.path_points import PointPlan, plan_points
 from mjwrap.muscles.laws import ActuatorForce, parameter_row
 from mjwrap.surfaces.rows import surface_rows
 
@@ -43,6 +44,12 @@ class Plan:
     output: (
         Ints  # (n,) output of the actuator whose length, velocity and moment mjwrap writes; -1: wrenches act
     )
+    points: PointPlan | None = None  # moving and conditional points, if there are any
+
+    @property
+    def uses(self) -> Ints:
+        """Where routes pass moving points, as in the kernels' `PathPoints`."""
+        return self.points.uses if self.points else np.empty((0, path_points.USE), dtype=np.int64)
 
     def route_group(self) -> Routes:
         """Return the kernels' group of routes."""
@@ -95,7 +102,7 @@ def _activation(model: mujoco.MjModel, declared: MuscleDeclaration, source: int)
 def kernel_rows(node: Node) -> list[Array]:
     """Return the kernels' rows of a stop, for a cold start; several if a string may touch its surface several times."""
     if node.surface is not None:
-        rows = surface_rows(node.surface, node.inside)
+        rows = surface_rows(node.surface, node.inside, node.side)
         rows[:, layout.HINT_TURN] = node.turn
         return list(rows)
     row = np.zeros(layout.ROW)
@@ -132,11 +139,13 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
     activations = [
         _activation(model, declared, source[0]) for declared, source in zip(muscles, sources, strict=True)
     ]
+    route_rows = np.array(routes, dtype=np.int64).reshape(-1, muscle_paths.ROUTE)
+    link_rows = np.array(links, dtype=np.int64).reshape(-1, 4)
     return Plan(
         n=n,
         node=np.array(rows).reshape(-1, layout.ROW),
-        links=np.array(links, dtype=np.int64).reshape(-1, 4),
-        routes=np.array(routes, dtype=np.int64).reshape(-1, muscle_paths.ROUTE),
+        links=link_rows,
+        routes=route_rows,
         weights=np.array(weights, dtype=np.float64),
         law=np.array([declared.parameters.code for declared in muscles], dtype=np.int64),
         params=np.array([parameter_row(m.parameters) for m in muscles]).reshape(n, dispatch.PARAMS),
@@ -148,5 +157,6 @@ def build_plan(model: mujoco.MjModel, muscles: list[MuscleDeclaration]) -> Plan:
         form=np.array([form for form, _ in activations], dtype=np.int64),
         times=np.array([row for _, row in activations], dtype=np.float64).reshape(-1, dynamics.TIMES),
         output=np.array(outputs, dtype=np.int64),
+        points=plan_points(model, muscles, route_rows, link_rows),
         integrates=any(s[0] in (dynamics.STATE_IN_MJWRAP, dynamics.STATE_IN_ACT) for s in sources),
     )

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.mjcf import MuscleDeclaration, read_moving_axes
 
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
@@ -40,14 +40,19 @@ def crossed_dofs(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) ->
     """Return the degrees of freedom that each muscle crosses, (n, nv).
 
     A route crosses a degree of freedom that moves some, but not all, of the bodies of its sites and geoms; only these
-    can change its length. A muscle crosses those that any of its routes crosses.
+    can change its length. A muscle crosses those that any of its routes crosses, and those of the joints that move its
+    path points or decide whether these are present.
     """
     moves = moving_dofs(model)
+    axes = read_moving_axes(model)
     crossed = np.zeros((len(muscles), model.nv), dtype=np.bool_)
     for i, muscle in enumerate(muscles):
         for route in muscle.routes:
-            sites = [route.origin, route.insertion, *(node.site for node in route.nodes if node.site >= 0)]
+            sites = route.sites
             geoms = [node.geom for node in route.nodes if node.geom >= 0]
             stops = moves[[*model.site_bodyid[sites], *model.geom_bodyid[geoms]]]
             crossed[i] |= stops.any(axis=0) & ~stops.all(axis=0)
+            joints = [axis.joint for axis in axes if axis.site in sites]
+            joints += [each.joint for presence in route.when for each in presence.ranges]
+            crossed[i, model.jnt_dofadr[joints]] = True
     return crossed

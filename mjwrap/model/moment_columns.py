@@ -9,6 +9,7 @@ import numpy as np
 
 from mjwrap.errors import ModelError
 from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.coupling.path_points import U_DOF, U_ROUTE
 from mjwrap.mjcf import MuscleDeclaration, name_of
 from mjwrap.model.arrays import Plan
 from mjwrap.model.kinematic_tree import moving_dofs
@@ -26,7 +27,7 @@ def _columns(model: mujoco.MjModel, actuator: int) -> set[int]:
 def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: Sequence[MuscleDeclaration]) -> None:
     """Raise `ModelError` if the path of a muscle depends on a dof for which MuJoCo stores no moment of its actuator."""
     moves = moving_dofs(model)
-    for route in plan.routes:
+    for c, route in enumerate(plan.routes):
         muscle = muscles[int(route[muscle_paths.R_MUSCLE])]
         if plan.output[route[muscle_paths.R_MUSCLE]] < 0:
             continue
@@ -34,6 +35,15 @@ def check_moment_columns(model: mujoco.MjModel, plan: Plan, muscles: Sequence[Mu
         bodies = [int(route[muscle_paths.R_FROM_BODY]), *stops, int(route[muscle_paths.R_TO_BODY])]
         moved = {body: set(np.flatnonzero(moves[body]).tolist()) for body in bodies}
         stored = _columns(model, muscle.actuator) | set.intersection(*moved.values())
+        for dof in plan.uses[plan.uses[:, U_ROUTE] == c, U_DOF].tolist():
+            if dof not in _columns(model, muscle.actuator):
+                tendon = name_of(model, OBJ.mjOBJ_TENDON, int(model.actuator_trnid[muscle.actuator, 0]))
+                joint = name_of(model, OBJ.mjOBJ_JOINT, int(model.dof_jntid[dof]))
+                raise ModelError(
+                    f"muscle '{muscle.name}': joint '{joint}' moves a point of its path, but does not move tendon "
+                    f"'{tendon}', so MuJoCo does not store its moment there; let the tendon pass a site that the joint "
+                    f"moves, or use mode 'wrench'"
+                )
         for body, dofs in moved.items():
             if not dofs <= stored:
                 tendon = name_of(model, OBJ.mjOBJ_TENDON, int(model.actuator_trnid[muscle.actuator, 0]))

@@ -5,9 +5,12 @@ from mjwrap.muscles.laws import (
     ActuatorForce,
     DeGrooteFregly2016,
     Law,
+    Ligament,
     Millard2012,
     MuJoCoMuscle,
     PathActuator,
+    PathSpring,
+    Thelen2003,
 )
 
 __all__ = [
@@ -15,7 +18,10 @@ __all__ = [
     "ActuatorForce",
     "DeGrooteFregly2016",
     "Law",
+    "Ligament",
     "Millard2012",
     "MuJoCoMuscle",
     "PathActuator",
+    "PathSpring",
+    "Thelen2003",
 ]

@@ -101,7 +101,7 @@ def simulate_muscle(
     params = np.array([parameter_row(law)])
     chosen = dynamics or ActivationDynamics()
     kernels.simulate(
-        law.code, params, chosen.form, np.array(chosen.row()), t, lengths, speeds, drive, _rates(drive, t),
+        law.code, params, chosen.form, np.array([chosen.row()]), t, lengths, speeds, drive, _rates(drive, t),
         activation is not None, states, fibers, tension, counts,
     )  # fmt: skip
     return MuscleTrial(t, lengths, states, fibers, tension, counts[:, 0], counts[:, 1])

@@ -7,8 +7,18 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels.musculotendon.dispatch import has_fiber, length_curves, velocity_curve
-from mjwrap.kernels.musculotendon.fiber import DAMPING, ELASTIC, F_MAX, HEIGHT, LEAST, OPTIMAL, SLACK, V_MAX
+from mjwrap.kernels.musculotendon.dispatch import curve_set, has_fiber, length_curves, velocity_force
+from mjwrap.kernels.musculotendon.fiber import (
+    DAMPING,
+    ELASTIC,
+    F_MAX,
+    HEIGHT,
+    LEAST,
+    OPTIMAL,
+    SLACK,
+    V_MAX,
+    held_activation,
+)
 from mjwrap.kernels.musculotendon.tension import tension
 
 Vector = NDArray[np.float64]
@@ -82,7 +92,9 @@ def fiber_state(
         given = float(activation[m]), float(length[m]), float(velocity[m])
         if has_fiber(int(law[m])):
             now = float(fiber_length[m]), float(fiber_velocity[m])
-            values = _with_fiber(int(law[m]), params[m], *given[:2], *now)
+            curves = curve_set(int(law[m]), params, m)
+            activation_held = float(held_activation(params, m, given[0]))
+            values = _with_fiber(curves, params[m], activation_held, given[1], *now)
         else:
             passive = tension(int(law[m]), params, m, 0.0, *given[1:])
             active = tension(int(law[m]), params, m, *given) - passive
@@ -94,16 +106,16 @@ def fiber_state(
 
 
 def _with_fiber(
-    law: int, row: Vector, activation: float, length: float, fiber: float, speed: float
+    curves: int, row: Vector, activation: float, length: float, fiber: float, speed: float
 ) -> dict[str, float]:
-    """Return the state of a muscle with a fibre; row (PARAMS,): its parameters."""
+    """Return the state of a muscle with a fibre; row (PARAMS,): its parameters, curves: as of `curve_set`."""
     height, optimal, fastest = float(row[HEIGHT]), float(row[OPTIMAL]), float(row[V_MAX] * row[OPTIMAL])
     now = max(fiber, float(row[LEAST]) if row[ELASTIC] else height, SHORTEST)
     along = float(np.sqrt(max(now * now - height * height, 0.0)))
     cosine = along / now if height else 1.0
-    multiplier, _, elastic, _ = length_curves(law, now / optimal)
-    rate, _ = velocity_curve(law, speed / fastest)
-    active = row[F_MAX] * min(max(activation, 0.0), 1.0) * multiplier * rate
+    multiplier, _, elastic, _ = length_curves(curves, now / optimal)
+    rate, _, _ = velocity_force(curves, activation, speed / fastest)
+    active = row[F_MAX] * activation * multiplier * rate
     passive = row[F_MAX] * (elastic + row[DAMPING] * speed / fastest)
     return {
         "length": now,

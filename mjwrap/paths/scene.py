@@ -14,7 +14,7 @@ from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.spans import chain
 from mjwrap.surfaces import Surface
-from mjwrap.surfaces.rows import surface_rows
+from mjwrap.surfaces.rows import side_fault, surface_rows
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -50,6 +50,9 @@ class Obstacle:
         inside: the path must meet the solid and is not kept out of it: it is the shortest path that meets the solid,
             with a corner at one point if the straight line does not meet it. Only for a sphere or a cylinder of any
             length, between end points and via points.
+        side: (3,) a point in the surface's frame [m] on the half on which the path passes the surface at every pose,
+            warm or cold; None for no side. Only its direction from the origin counts, and from the axis where there
+            is one. An obstacle has a hint or a side, not both.
 
     Raises:
         GeometryError: a value is not possible.
@@ -60,6 +63,7 @@ class Obstacle:
     quat: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     hint: tuple[float, ...] | None = None
     inside: bool = False
+    side: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.surface, Surface):
@@ -77,6 +81,19 @@ class Obstacle:
         if self.inside and not (self.surface.held_about and math.isinf(self.surface.z_limit)):
             raise GeometryError(
                 f"Obstacle: only a Sphere or an infinite Cylinder can have inside=True, not {self.surface!r}"
+            )
+        if self.side is not None:
+            self._check_side(self.side)
+
+    def _check_side(self, side: ArrayLike) -> None:
+        object.__setattr__(self, "side", vector(side, 3, "Obstacle: side"))
+        if self.hint is not None or self.inside:
+            other = "a hint" if self.hint is not None else "inside=True"
+            raise GeometryError(f"Obstacle: give a side or {other}, not both")
+        fault = side_fault(self.surface, side)
+        if fault:
+            raise GeometryError(
+                f"Obstacle: side {self.side} lies {fault} of {self.surface!r}, so that it says no side"
             )
 
 
@@ -128,11 +145,12 @@ def pack(obstacles: Sequence[Obstacle | ViaPoint]) -> Array:
             node[first, layout.POS : layout.POS + 3] = obstacle.pos
             first += 1
             continue
-        rows = surface_rows(obstacle.surface, obstacle.inside)
+        rows = surface_rows(obstacle.surface, obstacle.inside, obstacle.side is not None)
         rows[:, layout.POS : layout.POS + 3] = obstacle.pos
-        if obstacle.hint is not None:
+        towards = obstacle.hint if obstacle.side is None else obstacle.side
+        if towards is not None:
             rows[0, layout.HINT] = 1.0
-            rows[0, layout.HINT + 1 : layout.HINT + 4] = obstacle.hint
+            rows[0, layout.HINT + 1 : layout.HINT + 4] = towards
         for row in range(len(rows)):
             chain.set_rotation(rows, row, *obstacle.quat)
         node[first : first + len(rows)] = rows

@@ -22,9 +22,10 @@ from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
 from mjwrap.model.moment_columns import check_moment_columns
+from mjwrap.model.piece_table import piece_table
 from mjwrap.model.takeover import Takeover
 from mjwrap.plugin.announcing import renumber
-from mjwrap.plugin.blocks.image import loaded_bodies, state_size
+from mjwrap.plugin.blocks.image import pulled_bodies, state_size
 from mjwrap.plugin.blocks.instance_muscles import read_muscles
 from mjwrap.plugin.mujoco_c.visualisation import drawing
 from mjwrap.plugin.registering import register, take_error
@@ -50,6 +51,8 @@ def install(
     spec: mujoco.MjSpec, mode: str = "wrench", *, keep_tendons: bool = False, side_rule: int | None = None
 ) -> mujoco.MjModel:
     """Add the engine plugin to an MjSpec, and compile a model whose `mj_step` runs the muscles.
+
+    It also switches the pieces of joints' couplings; a model that has these needs no muscle.
 
     The spec itself is changed, so that it can be compiled again, attached and saved: it gets an instance of the
     plugin, actuators without force, and invisible tendons, because the plugin draws the muscles. If an error is
@@ -89,12 +92,13 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: in
             "MuJoCo does not call the plugin while springs and dampers are both disabled; enable one of them"
         )
     marks.zero_disabled_ranges(model)
+    coupled = len(piece_table(model).equality) > 0
     with Takeover(model).original_limits():
         attached = [configuration_of(element) for element in spec_instances(spec)]
         taken = {name: (each.mode, each.side_rule) for each in attached for name in each.muscles}
         declared = _declared(model, (mode, rule), taken)
         muscles = [muscle for muscle in declared if muscle.name not in taken]
-        if not muscles and not taken:
+        if not muscles and not taken and not coupled:
             raise ModelError(
                 f"the model declares no muscle for mjwrap{_reasons(model, mode) or _hint(spec, mode)}"
             )
@@ -104,7 +108,7 @@ def _installed(spec: mujoco.MjSpec, mode: str, keep_tendons: bool, side_rule: in
     check_moment_columns(model, plan, muscles)
     if drawing():
         hide_tendons(spec, muscles)
-    prevent_sleep(spec, model, loaded_bodies(plan))
+    prevent_sleep(spec, model, pulled_bodies(model, plan))
     add_instance(spec, configuration_texts(names, state_size(plan), mode, rule))
     model = _compile(spec)
     if not keep_tendons:

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
+from mjwrap.kernels.coupling import path_points
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import Declarations
 from mjwrap.mjcf.side_rules import choose_side_rule
 from mjwrap.plugin.blocks.instance_muscles import read_instances
 from mjwrap.plugin.callbacks import block as bk
+from mjwrap.plugin.callbacks import path_points as pp
 from mjwrap.plugin.readout import block_address, head_of, instances, transmit
 from mjwrap.plugin.spec.configuration import TRANSMISSION, configuration_at
 from mjwrap.system.results import Results
@@ -110,6 +112,12 @@ def _view(block: int) -> Evaluation:
     view.status = array("status", ctypes.c_int64, n)
     view.failures = array("failures", ctypes.c_int64, n)
     view.last_failure = view.status
+    part = block + int(head[bk.A_POINTS])
+    places = np.ctypeslib.as_array((ctypes.c_int64 * pp.HEAD).from_address(part))
+    if places[pp.AXES]:
+        slopes = ctypes.c_double * int(places[pp.AXES] * path_points.SLOPE)
+        found = np.ctypeslib.as_array(slopes.from_address(part + int(places[pp.A_SLOPES])))
+        view.slopes = found.reshape(-1, path_points.SLOPE)
     return view
 
 
@@ -122,6 +130,7 @@ def _joined(views: list[Evaluation]) -> Evaluation:
     joined.activation, joined.fiber, joined.length, joined.velocity, joined.tension = joined.numbers
     for name in ("segments", "info", "count", "status", "failures", "last_failure"):
         setattr(joined, name, np.concatenate([getattr(view, name) for view in views]))
+    joined.slopes = views[0].slopes  # of all moving sites of the model, in every instance
     row = 0
     for view in views:
         rows = slice(row, row + len(view.segments))

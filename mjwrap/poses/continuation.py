@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.mjcf.conditional_points import routes_that_hold
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.poses.continuity import Smallest, jump_candidates, refine_jump, smallest_jumps
 from mjwrap.poses.sizes import muscle_size
@@ -116,6 +117,12 @@ class PathFollower:
         """Return why muscle i has no continuous moment arm at a position, starting from the trace; empty if it has."""
         self.touched(place, trace, i, at)
         return moment_arm_break(self._muscles, self._data, i, self._sizes[i])
+
+    def is_conditional_edge(self, place: Place, i: int, before: float, after: float) -> bool:
+        """Return whether a conditional point of muscle i comes or goes between two positions."""
+        model, muscle = self._muscles.model, self._muscles.declarations[i : i + 1]
+        at = [routes_that_hold(model, muscle, place(value)[0]) for value in (before, after)]
+        return at[0] != at[1]
 
     def touched(self, place: Place, trace: SweepTrace, i: int, at: float) -> int:
         """Return the number of surfaces that muscle i touches at a position, starting from the trace."""

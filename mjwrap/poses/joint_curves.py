@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import fnmatch
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -17,7 +18,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.model.takeover import Takeover
-from mjwrap.poses.continuation import PathFollower
+from mjwrap.poses.continuation import PathFollower, Place
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.tendon_curves import native_tendons, tendon_rows
 from mjwrap.system import CableSystem, is_cable
@@ -26,6 +27,7 @@ from mjwrap.text import counted_paths
 Array = NDArray[np.float64]
 _SINGLE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 MOVED = 1e-9  # a joint moves a muscle if its length changes by more than this share of it
+HALVINGS = 50  # of the interval in which a conditional path point comes or goes
 # the quantities of `JointCurves`, with their units
 QUANTITIES = {
     "length": "m",
@@ -68,6 +70,7 @@ class JointCurves:
             whose route MuJoCo's tendon does not have.
         follows: the joint that this joint follows by an equality, or "". The sweep moves it alone then.
         cables: names of those of the muscles that are cables: MuJoCo's own actuators pull them.
+        edges: by muscle, the positions at which a conditional path point comes or goes, so that its length may jump.
     """
 
     joint: str
@@ -78,6 +81,7 @@ class JointCurves:
     native: Mapping[str, Array]
     follows: str = ""
     cables: tuple[str, ...] = ()
+    edges: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         ends = (self.at[0], self.at[-1])
@@ -193,7 +197,30 @@ def curves(
         own,
         "" if leader is None else leader,
         tuple(system.names[i] for i in chosen if cables[i]),
+        _edges(follower, system, lambda value: maker.place(index, 0, value), at, chosen),
     )
+
+
+def _edges(
+    follower: PathFollower, muscles: CableSystem, place: Place, at: Array, chosen: Sequence[int]
+) -> dict[str, tuple[float, ...]]:
+    """Return the conditional edges of the chosen muscles, by name."""
+    found: dict[str, list[float]] = {}
+    declared = [(int(i), muscles.declarations[i]) for i in chosen]
+    conditional = {i: muscle.name for i, muscle in declared if any(route.when for route in muscle.routes)}
+    for before, after in itertools.pairwise(at.tolist() if conditional else []):
+        for i, name in conditional.items():
+            low, high = before, after
+            if not follower.is_conditional_edge(place, i, low, high):
+                continue
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                if follower.is_conditional_edge(place, i, low, middle):
+                    high = middle
+                else:
+                    low = middle
+            found.setdefault(name, []).append(0.5 * (low + high))
+    return {name: tuple(places) for name, places in found.items()}
 
 
 def _joint(model: mujoco.MjModel, name: str) -> int:

@@ -166,6 +166,8 @@ class Scene:
         for muscle, name in zip(self.declarations, self.muscle_names, strict=True):
             ends = [("origins", muscle.origin_site), ("insertions", muscle.insertion_site)]
             for kind, site in ends + [("via_points", site) for site in muscle.via_sites]:
+                if site in muscle.moving_sites:
+                    continue  # not fixed in its body; the path itself shows it
                 where[kind, int(self.model.site_bodyid[site])][int(site)].append(name)
         points = {}
         for (kind, body), sites in where.items():

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import mujoco
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import has_plugin, name_of, names, read_model, read_spec
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.runs.angles import check_position
 
 INTEGRATORS = {
@@ -58,16 +59,32 @@ def start_state(
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Mapping[str, float]) -> None:
     """Reset data to a keyframe (-1: to qpos0), then set hinges and slides to positions [rad, m] by name.
 
-    Warns if a position lies outside its joint's range. Raises `ModelError` for a name that is not a hinge or slide, and
-    for positions that only degrees can explain (`check_position`).
+    Joints that follow them, and are not given themselves, are set too. Warns if a position lies outside its joint's
+    range. Raises `ModelError` for a name that is not a hinge or slide, and for positions that only degrees can explain
+    (`check_position`).
     """
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
+    given = []
     for name, value in positions.items():
         entry = f"{name}={value:g}"
         joint = find_joint(model, name, entry)
         data.qpos[model.jnt_qposadr[joint]] = value
         check_position(model, joint, value, f"'{entry}'")
+        given.append(joint)
+    place_followers(model, data, given)
+
+
+def place_followers(model: mujoco.MjModel, data: mujoco.MjData, joints: Collection[int]) -> None:
+    """Set the joints that follow these joints by equalities to their positions and speeds; these joints stay."""
+    couplings = CoupledJoints(model)
+    qpos, qvel = data.qpos.copy(), data.qvel.copy()
+    couplings.place(qpos)
+    couplings.spread(qpos, qvel)
+    for joint in couplings.leader:
+        if joint not in joints and any(head in joints for head in couplings.heads(joint)):
+            data.qpos[model.jnt_qposadr[joint]] = qpos[model.jnt_qposadr[joint]]
+            data.qvel[model.jnt_dofadr[joint]] = qvel[model.jnt_dofadr[joint]]
 
 
 def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:

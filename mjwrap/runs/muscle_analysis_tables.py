@@ -119,8 +119,7 @@ class MuscleAnalysisTables:
         moving = crossed.copy()
         leaders = self._couplings.leader
         for joint in leaders:
-            head = self._couplings.head(joint)
-            if head >= 0:
+            for head in self._couplings.heads(joint):
                 moving[model.jnt_dofadr[head]] |= crossed[model.jnt_dofadr[joint]]
         return np.flatnonzero(moving).tolist()
 

@@ -19,7 +19,7 @@ from mjwrap.runs.compile_time import CompileClock, rehearse
 from mjwrap.runs.control_limits import check_levels
 from mjwrap.runs.engine import MODES, start_engine
 from mjwrap.runs.excitation import Excitation
-from mjwrap.runs.models import INTEGRATORS, set_state, start_keyframe
+from mjwrap.runs.models import INTEGRATORS, place_followers, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
 from mjwrap.runs.table_spans import uncovered
@@ -137,6 +137,7 @@ class Simulation:
         valid force to keep.
         """
         self.prescribed.place(self.engine.data)
+        place_followers(self.engine.model, self.engine.data, self.prescribed.joints)
         self.start = self.engine.data.qpos.copy()
         self.excitation.write(self.engine.data)
         rehearse(self.engine)

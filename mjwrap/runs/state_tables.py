@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import TableError
 from mjwrap.files import Table
-from mjwrap.mjcf import act_names, dof_names, qpos_names
+from mjwrap.mjcf import act_names, dof_names, name_of, qpos_names
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.runs.angles import check_column
 from mjwrap.runs.excitation import control_names
 from mjwrap.runs.models import single_joints
@@ -79,7 +80,7 @@ def read_states(model: mujoco.MjModel, muscles: MuscleSystem, start: mujoco.MjDa
     in tables of `mjwrap run`; "qpos[3]" by index; a joint's name, "JOINT/value", "JOINT/speed", "MUSCLE/activation" and
     "MUSCLE/fiber_length" as in OpenSim's files, with or without a path before them. "act" overrides other columns for
     the same state. Hinges are in rad, or in degrees if the header says so. Velocities that are missing are computed
-    as differences of the positions.
+    as differences of the positions. Joints that are missing and follow others by equalities are where these put them.
 
     Args:
         model: the model.
@@ -190,7 +191,16 @@ class _Reader:
         """Return the states; velocities that are missing are computed as differences."""
         arrays, model, time = self.arrays, self.model, self.table.time
         remarks = []
-        left = [name for i, name in enumerate(self.names["qpos"]) if i not in self.found["qpos"]]
+        placed = self._place_followers()
+        if placed:
+            remarks.append(
+                f"{counted(len(placed), 'position')} missing, of joints that follow others: {_few(placed)}"
+            )
+        left = [
+            name
+            for i, name in enumerate(self.names["qpos"])
+            if i not in self.found["qpos"] and name not in placed
+        ]
         if left:
             remarks.append(f"{counted(len(left), 'position')} missing, taken from the start: {_few(left)}")
         if not self.found["qvel"]:
@@ -201,6 +211,27 @@ class _Reader:
         if self.unused:
             remarks.append(f"{counted(len(self.unused), 'column')} not used: {_few(self.unused)}")
         return States(time, **arrays, remarks=tuple(remarks))
+
+    def _place_followers(self) -> list[str]:
+        """Set joints that are missing, and follow joints of the table by equalities; return their names."""
+        model, qpos, qvel = self.model, self.arrays["qpos"], self.arrays["qvel"]
+        couplings = CoupledJoints(model)
+        found = {kind: self.found[kind] for kind in ("qpos", "qvel")}
+        missing = [
+            joint
+            for joint in couplings.leader
+            if int(model.jnt_qposadr[joint]) not in found["qpos"]
+            and any(int(model.jnt_qposadr[head]) in found["qpos"] for head in couplings.heads(joint))
+        ]
+        at, dofs = model.jnt_qposadr[missing], model.jnt_dofadr[missing]
+        slow = [k for k, dof in enumerate(dofs.tolist()) if found["qvel"] and dof not in found["qvel"]]
+        for row, speeds in zip(qpos, qvel, strict=True) if missing else ():
+            pose, tangent = row.copy(), speeds.copy()
+            couplings.place(pose)
+            couplings.spread(pose, tangent)
+            row[at] = pose[at]
+            speeds[dofs[slow]] = tangent[dofs[slow]]
+        return [name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint) for joint in missing]
 
     def _not_given(self) -> list[str]:
         """Return remarks on states of muscles and actuators that are missing from the table."""

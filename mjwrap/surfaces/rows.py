@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mjwrap.errors import GeometryError
 from mjwrap.kernels import layout
 from mjwrap.kernels.geometry.dispatch import is_surface_kind
+from mjwrap.kernels.wraps.sides import ON_AXIS
 from mjwrap.surfaces.surface import Surface
 
 Array = NDArray[np.float64]
@@ -46,14 +49,24 @@ def write_surface(surface: Surface, rows: Array) -> None:
     rows[:, layout.Z_LIMIT] = surface.z_limit
 
 
-def surface_rows(surface: Surface, inside: bool = False) -> Array:
+def side_fault(surface: Surface, point: ArrayLike) -> str | None:
+    """Return why a point (3,) in the surface's frame [m] says no side that holds at every pose; None where it does."""
+    x, y, z = np.asarray(point, dtype=np.float64).tolist()
+    if surface.branched and surface.closed_form:
+        return "on the axis" if math.hypot(x, y) < ON_AXIS * surface.size else None
+    return "in the middle" if math.sqrt(x * x + y * y + z * z) < ON_AXIS * surface.size else None
+
+
+def surface_rows(surface: Surface, inside: bool = False, sided: bool = False) -> Array:
     """Return the rows (touches, ROW) of a surface for a cold start, without pose and hint.
 
-    inside: the string must meet the solid. Raises `GeometryError` as `write_surface` does.
+    inside: the string must meet the solid. sided: the hint is a side that holds at every pose. Raises `GeometryError`
+    as `write_surface` does.
     """
     rows = np.zeros((surface.touches, layout.ROW))
     write_surface(surface, rows)
     rows[:, layout.S_MODE] = layout.COLD
     rows[:, layout.TOUCH] = np.arange(surface.touches)
     rows[:, layout.INSIDE] = surface.held_about if inside else 0.0
+    rows[0, layout.TRAITS] += layout.SIDED * sided
     return rows

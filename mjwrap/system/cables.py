@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.kernels.coupling import from_python
 from mjwrap.mjcf import Declarations, MuscleDeclaration, is_muscle, read_declarations, tendon_declarations
 from mjwrap.model.moment_columns import check_moment_columns
 from mjwrap.muscles.laws import ActuatorForce, PathActuator
@@ -96,11 +95,7 @@ class CableSystem(MuscleSystem):
         poses.actuator_velocity[self._outputs] = gear * state.velocity[self._rows]
         if poses is state.scratch:
             return
-        from_python.length_jacobian(
-            *self._routes, *state.paths,
-            self._last_dof, self._dofs[2], self._root, poses.cdof, poses.subtree_com,
-            self._jacobian,
-        )  # fmt: skip
+        self._write_jacobian(state, poses, self._jacobian)
         columns = poses.moment_colind.reshape(-1)
         moment = poses.actuator_moment.reshape(-1)
         for row, output, factor in zip(self._rows, self._outputs, gear, strict=True):

@@ -40,8 +40,8 @@ def length_jacobian_rate(muscles: Results, state: State, direction: ArrayLike | 
         scratch.cvel, scratch.cdof, scratch.cdof_dot, scratch.subtree_com,
     )  # fmt: skip
     fault, route, slot = jacobian_rate.length_jacobian_rate(
-        plan.routes, plan.weights, plan.links, scratch.site_xpos, state.node, kinematics,
-        *work, np.arange(longest), points, jacobian,
+        plan.routes, plan.weights, plan.links, scratch.site_xpos, state.node, state.count, kinematics,
+        plan.uses, state.slopes, scratch.qvel, *work, np.arange(longest), points, jacobian,
     )  # fmt: skip
     if fault != hessian.NO_FAULT:
         row = plan.routes[route]

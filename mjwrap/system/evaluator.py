@@ -17,6 +17,7 @@ from mjwrap.model.takeover import Takeover
 from mjwrap.muscles.laws import ActuatorForce
 from mjwrap.paths import Status
 from mjwrap.system.checks import check_state, ends_inside
+from mjwrap.system.pieces import PieceSwitch
 from mjwrap.system.results import Array, Results
 from mjwrap.system.state import State
 
@@ -43,6 +44,7 @@ class Evaluator(Results):
         with self._takeover.original_limits():
             found = self._declarations(model, side_rule)
         plan = build_plan(model, found.muscles)
+        self._pieces = PieceSwitch(model)
         super().__init__(found, plan, model, State(model, plan))
         self._takeover.disable(
             [
@@ -107,20 +109,37 @@ class Evaluator(Results):
         since [s]: age of the states in `data`; ahead [s]: time for which the tensions will act.
         """
         self._switch_off()
-        failed = from_python.evaluate(
+        evaluate, points = from_python.evaluate, ()
+        if state.points is not None:
+            evaluate = from_python.evaluate_with_points
+            points = (
+                *state.points, poses.qpos, poses.qvel, poses.xpos, poses.xmat, self.model.site_pos,
+            )  # fmt: skip
+        failed = evaluate(
             *self._routes, *self._muscles,
             poses.site_xpos, poses.geom_xpos, poses.geom_xmat, poses.cvel, poses.subtree_com, poses.xipos, self._root,
             data.act, data.ctrl, state.own, self._excitation,
             since, ahead, self.model.opt.timestep,
             TOLERANCE,
             *state.paths, *state.start, *state.found,
-            state.wrench,
+            state.wrench, *points,
         )  # fmt: skip
         self._last = state
         state.time, state.evaluated = data.time, True
         state.in_scratch = poses is state.scratch
         if failed:
             self._failed(state, poses, data)
+
+    def _write_jacobian(self, state: State, poses: mujoco.MjData, jacobian: Array) -> None:
+        """Write dl/dq (n, nv) of the last evaluation, which took its poses from `poses`."""
+        from_python.length_jacobian(
+            *self._routes, *state.paths,
+            self._last_dof, self._dofs[2], self._root, poses.cdof, poses.subtree_com,
+            jacobian,
+        )  # fmt: skip
+        if self._plan.points is not None:
+            uses, slopes = self._plan.points.uses, state.slopes
+            from_python.add_point_columns(*self._routes, *state.paths, uses, slopes, jacobian)
 
     def _switch_off(self) -> None:
         """Note which muscles are switched off by the model's options: all, or those of an actuator group."""

@@ -86,7 +86,7 @@ class History:
             Store(rows, routes, 3), Store(rows, n, 3), Store(rows, n, recorded_frames.FORCE)
         )  # fmt: skip
         self._plan = plan.routes, plan.weights, plan.links
-        self._tree = tree
+        self._tree, self._uses = tree, plan.uses
         for array in (self._numbers, self._arms, self._positions, self._quaternions):
             array.fill(0.0)  # makes the system allocate the memory now, not during a run
 
@@ -107,7 +107,7 @@ class History:
             *self._plan, last.node, last.segments, last.count, last.info, last.tension, spacing or 0.0, *self._tree,
             poses.cdof, poses.subtree_com, poses.xpos, poses.xquat, *self._pairs, self._jacobian, frame,
             points.rows, points.starts, contacts.rows, contacts.starts, forces.rows, forces.starts, self._arms,
-            self._positions, self._quaternions,
+            self._positions, self._quaternions, self._uses, last.slopes,
         ):  # fmt: skip
             for store in (points, contacts, forces):
                 store.grow(frame)

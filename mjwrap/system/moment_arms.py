@@ -59,9 +59,10 @@ def _dofs(model: mujoco.MjModel, couplings: CoupledJoints, coordinates: list[str
             raise GeometryError(f"no joint '{name}' for a moment arm; {meant}")
         joint = known.index(name)
         if joint in couplings.leader:
-            head = couplings.head(joint)
-            instead = f"give that joint, '{known[head]}'" if head >= 0 else "there is no moment arm about it"
-            follows = f"follows '{known[head]}'" if head >= 0 else "is held at a position"
+            heads = [f"'{known[head]}'" for head in couplings.heads(joint)]
+            those, led = "that joint" if len(heads) == 1 else "one of these", ", ".join(heads)
+            instead = f"give {those}, {led}" if heads else "there is no moment arm about it"
+            follows = f"follows {' and '.join(heads)}" if heads else "is held at a position"
             raise GeometryError(f"joint '{name}' {follows} by an equality of the model: {instead}")
         first = int(model.jnt_dofadr[joint])
         count = {int(mujoco.mjtJoint.mjJNT_FREE): 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}

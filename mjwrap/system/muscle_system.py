@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.kernels import layout
-from mjwrap.kernels.coupling import from_python, wrenches
+from mjwrap.kernels.coupling import wrenches
 from mjwrap.kernels.musculotendon import dynamics
 from mjwrap.kernels.musculotendon.dispatch import PATH_ACTUATOR
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
@@ -73,13 +73,16 @@ class MuscleSystem(Evaluator):
     def apply(self, data: mujoco.MjData) -> None:
         """Call `forward`, then add the muscles' wrenches to `data.xfrc_applied`.
 
+        The forces on joints that move path points are added to `data.qfrc_applied` in the same way.
         The wrenches that the previous call added are removed first. Call it once before each `mj_step` with an Euler or
         implicit integrator; under RK4 use `step`, which evaluates the muscles at every stage. Between calls other code
         may add forces to `xfrc_applied` or set the whole array; code that assigns changing forces to single rows should
         use `step`, which does not touch them. The tensions are those for the coming time step (with an elastic tendon:
-        at its end). The states that mjwrap integrates itself do not change: `advance` integrates them.
+        at its end). Couplings of several pieces are switched for that step, in `data.eq_active`. The states that mjwrap
+        integrates itself do not change: `advance` integrates them.
         """
         state = self._state(data)
+        self._pieces.set(data)
         self._evaluate(state, self._refresh(state, data), data, ahead=self.model.opt.timestep)
         state.applied = data.time
         state.failures += state.status != 0
@@ -87,6 +90,8 @@ class MuscleSystem(Evaluator):
         wrenches.add_to_xfrc(
             data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench
         )
+        if state.joint_forces is not None:
+            state.joint_forces.add(data)
 
     def advance(self, data: mujoco.MjData) -> None:
         """Integrate the states that mjwrap keeps to the end of the step for which `apply` computed the forces.
@@ -112,11 +117,7 @@ class MuscleSystem(Evaluator):
         self.forward(data)
         state, plan = self._last, self._plan
         jacobian = np.zeros((plan.n, self.model.nv))
-        from_python.length_jacobian(
-            *self._routes, *state.paths,
-            self._last_dof, self._dofs[2], self._root, state.scratch.cdof, state.scratch.subtree_com,
-            jacobian,
-        )  # fmt: skip
+        self._write_jacobian(state, state.scratch, jacobian)
         return jacobian
 
     @property
@@ -193,7 +194,8 @@ class MuscleSystem(Evaluator):
     def step(self, data: mujoco.MjData, nstep: int = 1) -> None:
         """Advance the simulation by `nstep` time steps with the muscles' forces at every stage of the integrator.
 
-        Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds only the forces of other code.
+        Works for every integrator of MuJoCo. Afterwards `data.xfrc_applied` holds only the forces of other code;
+        forces on joints that move path points are among `data.qfrc_passive`.
         Raises `StateError` if the state is not finite, or if MuJoCo resets it because the motion became unstable.
         """
         if not (isinstance(nstep, int | np.integer) and nstep >= 0):
@@ -207,6 +209,7 @@ class MuscleSystem(Evaluator):
             else:
                 for _ in range(nstep):
                     self._check(data)
+                    self._pieces.set(data)
                     mujoco.mj_step1(self.model, data)
                     self._act(state, data, ahead=self.model.opt.timestep)
                     state.failures += state.status != 0
@@ -224,14 +227,18 @@ class MuscleSystem(Evaluator):
             )
 
     def _act(self, state: State, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0) -> None:
-        """Evaluate at the present stage of `data`, whose kinematics are up to date, and add the wrenches."""
+        """Evaluate at the present stage of `data`, whose kinematics are up to date, and add the forces."""
         self._evaluate(state, data, data, since, ahead)
         wrenches.add_to_xfrc(
             data.xfrc_applied, state.others, state.mine, state.total, state.written, state.wrench
         )
+        if state.points is not None:  # MuJoCo clears the passive forces before every stage
+            data.qfrc_passive += state.points.force
 
     def _take_back(self, state: State, data: mujoco.MjData) -> None:
         wrenches.remove_from_xfrc(data.xfrc_applied, state.others, state.mine, state.total, state.written)
+        if state.joint_forces is not None:
+            state.joint_forces.remove(data)
 
     def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> None:
         """Step under Runge-Kutta: add the wrenches in MuJoCo's control callback, which runs at every stage."""
@@ -245,6 +252,7 @@ class MuscleSystem(Evaluator):
             if caught:
                 return
             try:
+                self._pieces.rebuild(data)
                 # a stage is at a multiple of half a step; data.time is rounded
                 self._act(state, data, since=half * round((data.time - start) / half))
                 np.logical_or(failed, state.status != 0, out=failed)
@@ -254,9 +262,11 @@ class MuscleSystem(Evaluator):
             ) as error:  # an exception must not pass through MuJoCo's C code; it is raised below
                 caught.append(error)
 
-        with control_callback(data, act, lambda: self._take_back(state, data)):
+        pieces = self._pieces.stages(data, controlled=True)
+        with pieces, control_callback(data, act, lambda: self._take_back(state, data)):
             for _ in range(nstep):
                 self._check(data)
+                self._pieces.set(data)
                 start = data.time
                 failed[:] = False
                 acted = False
@@ -277,6 +287,8 @@ class MuscleSystem(Evaluator):
             for state in self._states.values():
                 state.forget()
                 state.written[:] = False
+                if state.joint_forces is not None:
+                    state.joint_forces.forget()
         else:
             self._last = self._state(data)
             self._take_back(self._last, data)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from mjwrap import html, plots
 from mjwrap.errors import MjwrapError, StateError
 from mjwrap.mjcf import MuscleDeclaration, Route, is_muscle
+from mjwrap.mjcf.conditional_points import when_text
+from mjwrap.mjcf.moving_points import site_text
 from mjwrap.mjcf.names import name_of
 from mjwrap.muscles.laws import ActuatorForce, Law
 from mjwrap.paths import Status
@@ -202,16 +204,18 @@ def _cables(muscles: Muscles) -> int:
 
 def route_text(model: mujoco.MjModel, route: Route) -> str:
     """Return the stops of a route by name."""
-    stops = [name_of(model, _SITE, route.origin)]
+    stops = [site_text(model, route.moving, route.origin)]
     for node in route.nodes:
         if node.surface is None:
-            stops.append(name_of(model, _SITE, node.site))
+            stops.append(site_text(model, route.moving, node.site))
         else:
             hint = f", side {name_of(model, _SITE, node.hint_site)}" if node.hint_site >= 0 else ""
+            hint += " at every pose" * node.side
             kind = type(node.surface).__name__.lower()
             stops.append(f"{name_of(model, _GEOM, node.geom)} ({kind}{hint}{', held inside' * node.inside})")
-    stops.append(name_of(model, _SITE, route.insertion))
-    return (f"{route.weight:g} × " if route.weight != 1.0 else "") + " > ".join(stops)
+    stops.append(site_text(model, route.moving, route.insertion))
+    factor = f"{route.weight:g} × " if route.weight != 1.0 else ""
+    return factor + " > ".join(stops) + when_text(model, route.when)
 
 
 def system_text(muscles: Muscles) -> str:

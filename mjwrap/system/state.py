@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
+from mjwrap.kernels.coupling import path_points
 from mjwrap.kernels.coupling.groups import Paths
 from mjwrap.kernels.musculotendon.groups import MuscleStates, StepStart
 from mjwrap.kernels.solved import segments
 from mjwrap.model.arrays import Plan
+from mjwrap.system.joint_forces import JointForces
 
 NUMBERS = (
     "activation",
@@ -32,6 +34,7 @@ class Evaluation:
         self.paths = Paths(node, self.segments, self.count, self.info)
         self.numbers = np.zeros((len(NUMBERS), n))
         self.activation, self.fiber, self.length, self.velocity, self.tension = self.numbers
+        self.slopes = np.empty((0, path_points.SLOPE))  # of moving points, as in `PathPoints`
         self.status = np.zeros(n, dtype=np.int64)
         self.failures = np.zeros(n, dtype=np.int64)
         self.last_failure = np.zeros(n, dtype=np.int64)
@@ -55,6 +58,10 @@ class State(Evaluation):
         self.own = np.zeros((n, 2))  # activations and fibre lengths of muscles without an actuator
         self.wrench, self.others, self.mine, self.total = (np.zeros((model.nbody, 6)) for _ in range(4))
         self.written = np.zeros(model.nbody, dtype=np.bool_)
+        self.points = plan.points.group() if plan.points else None
+        self.joint_forces: JointForces | None = None
+        if self.points is not None:
+            self.slopes, self.joint_forces = self.points.slopes, JointForces(self.points)
         self.scratch = mujoco.MjData(model)
         self.applied: float | None = None  # time of an `apply` that `advance` has not followed yet
         self.in_scratch = (

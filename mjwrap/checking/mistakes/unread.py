@@ -18,6 +18,7 @@ _USABLE = {
     int(kind)
     for kind in (
         OBJ.mjOBJ_ACTUATOR, OBJ.mjOBJ_TENDON, OBJ.mjOBJ_SITE, OBJ.mjOBJ_GEOM, OBJ.mjOBJ_NUMERIC, OBJ.mjOBJ_TEXT,
+        OBJ.mjOBJ_JOINT,
     )
 }  # fmt: skip
 Elements = list[tuple[int, int]]  # type and id of each

@@ -12,6 +12,8 @@ import mujoco
 
 from mjwrap.calibration.plausibility import as_unit
 from mjwrap.mjcf import MuscleDeclaration, Node, Route, name_of
+from mjwrap.mjcf.conditional_points import when_text
+from mjwrap.mjcf.moving_points import site_text
 from mjwrap.text import aligned
 
 _HEAD = ("muscle", "law", "F_max [N]", "l_opt [mm]", "l_slack [mm]", "tendon", "path")
@@ -39,27 +41,33 @@ def _size(value: float, scale: float) -> str:
 
 def path_text(model: mujoco.MjModel, route: Route) -> str:
     """Return the sites and surfaces of a route in words."""
-    stops = [_site(model, route.origin)]
+    stops = [site_text(model, route.moving, route.origin)]
     for is_via, group in itertools.groupby(route.nodes, lambda node: node.surface is None):
         nodes = list(group)
-        if is_via and len(nodes) > 1:
+        if is_via and len(nodes) > 1 and not (route.when or route.moving):
             stops.append(f"{len(nodes)} via points")
         else:
-            stops += [_stop(model, node) for node in nodes]
-    stops.append(_site(model, route.insertion))
-    return ("" if route.weight == 1.0 else f"{route.weight:g} × ") + " > ".join(stops)
+            stops += [_stop(model, route, node) for node in nodes]
+    stops.append(site_text(model, route.moving, route.insertion))
+    factor = "" if route.weight == 1.0 else f"{route.weight:g} × "
+    return factor + " > ".join(stops) + when_text(model, route.when)
 
 
-def _stop(model: mujoco.MjModel, node: Node) -> str:
+def _stop(model: mujoco.MjModel, route: Route, node: Node) -> str:
     if node.surface is None:
-        return _site(model, node.site)
+        return site_text(model, route.moving, node.site)
     side = f", side {_site(model, node.hint_site)}" if node.hint_site >= 0 else ""
+    side += " at every pose" * node.side
     held = ", held inside" if node.inside else ""
     return f"{_geom(model, node.geom)} ({type(node.surface).__name__.lower()}{side}{held})"
 
 
 def _site(model: mujoco.MjModel, site: int) -> str:
     return name_of(model, mujoco.mjtObj.mjOBJ_SITE, site)
+
+
+def _joint(model: mujoco.MjModel, joint: int) -> str:
+    return name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
 
 
 def _geom(model: mujoco.MjModel, geom: int) -> str:
@@ -82,6 +90,17 @@ def as_values(model: mujoco.MjModel, muscle: MuscleDeclaration) -> dict[str, Any
                 "origin": _site(model, route.origin),
                 "stops": [_stop_values(model, node) for node in route.nodes],
                 "insertion": _site(model, route.insertion),
+                "moving_sites": {
+                    _site(model, each.site): [_joint(model, joint) for joint in each.joints]
+                    for each in route.moving
+                },
+                "holds_where": [
+                    {
+                        "ranges": [[_joint(model, r.joint), r.low, r.high] for r in presence.ranges],
+                        "inside": presence.holds,
+                    }
+                    for presence in route.when
+                ],
             }
             for route in muscle.routes
         ],
@@ -96,5 +115,6 @@ def _stop_values(model: mujoco.MjModel, node: Node) -> dict[str, Any]:
         "surface": type(node.surface).__name__,
         "sizes": list(node.surface.dims),
         "side_site": _site(model, node.hint_site) if node.hint_site >= 0 else None,
+        "side_at_every_pose": node.side,
         "held_inside": node.inside,
     }

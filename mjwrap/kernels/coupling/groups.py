@@ -39,6 +39,31 @@ class Paths(NamedTuple):
     info: FloatRows  # (C, INFO)
 
 
+class PathPoints(NamedTuple):
+    """Sites that move within their bodies, and routes that hold only in ranges of joints, see `path_points.py`."""
+
+    axes: IntRows  # (A, AXIS) axes along which sites move
+    numbers: Floats  # of the functions that say how
+    uses: IntRows  # (U, USE) where routes pass these sites
+    conditions: IntRows  # (K, CONDITION)
+    ranges: FloatRows  # (K, 2) of joint positions, both ends included
+    slopes: (
+        FloatRows  # (A, SLOPE) result: derivatives of the sites' positions with respect to the joints, world
+    )
+    active: Ints  # (C,) result: 1 for routes that hold at the present pose
+    force: Floats  # (nv,) result: generalised forces on the joints that move points
+
+
+class SiteFrames(NamedTuple):
+    """What places sites in the world, from MuJoCo."""
+
+    qpos: Floats
+    qvel: Floats
+    xpos: FloatRows  # (nbody, 3)
+    xmat: FloatRows  # (nbody, 9)
+    site_pos: FloatRows  # (nsite, 3)
+
+
 class Dofs(NamedTuple):
     """MuJoCo's tree of degrees of freedom and their motion axes."""
 

@@ -19,6 +19,7 @@ from mjwrap.kernels.coupling.muscle_paths import (
     R_TO,
     R_TO_BODY,
 )
+from mjwrap.kernels.coupling.path_points import S_FIRST, S_SECOND, U_AXIS, U_DOF, U_NODE, U_ROUTE
 from mjwrap.kernels.solved.hessian import NO_FAULT, add_gradient, add_stiffness_times, list_path_points
 
 
@@ -97,23 +98,47 @@ def _add_row(weight, k, place, body, gradient, rate, twist, kinematics, row, jac
         dof = dof_parentid[dof]
 
 
+@jit
+def _point_rate(use, k, slopes, qvel, twist, gradient, rate):
+    """Return the rate of what the moving site in slot k adds to dl/dq of its joint: of gradient . dp/dq."""
+    s, speed = slopes[use[U_AXIS]], qvel[use[U_DOF]]
+    sx, sy, sz = s[S_FIRST], s[S_FIRST + 1], s[S_FIRST + 2]
+    wx, wy, wz = twist[k, 3], twist[k, 4], twist[k, 5]
+    return (
+        rate[k, 0] * sx
+        + rate[k, 1] * sy
+        + rate[k, 2] * sz
+        + gradient[k, 0] * (s[S_SECOND] * speed + wy * sz - wz * sy)
+        + gradient[k, 1] * (s[S_SECOND + 1] * speed + wz * sx - wx * sz)
+        + gradient[k, 2] * (s[S_SECOND + 2] * speed + wx * sy - wy * sx)
+    )
+
+
 @from_python
 def length_jacobian_rate(
-    routes, weights, links, site_xpos, node, kinematics, twist, gradient, rate, owner, stop, jacobian
-):
+    routes, weights, links, site_xpos, node, seg_count, kinematics, uses, slopes, qvel, twist, gradient, rate, owner,
+    stop, jacobian,
+):  # fmt: skip
     """Write d(dl/dq)/dt (n, nv) of every muscle along the motion that cvel and cdof_dot belong to.
 
-    kinematics: arrays of mjModel and mjData, see `_add_row`. twist, gradient, rate (longest chain + 2, 6) and stop
-    (longest chain + 2, POINT_ROW) are scratch; owner: 0, 1, 2 ..., a slot for each node. Returns (NO_FAULT, 0, 0), or
-    fault, route and slot where there is no derivative.
+    kinematics: arrays of mjModel and mjData, see `_add_row`. uses, slopes: of moving points, as in `PathPoints`; qvel
+    (nv,): the motion. Routes without segments (seg_count) do not hold at the pose, and are left out. twist, gradient,
+    rate (longest chain + 2, 6) and stop (longest chain + 2, POINT_ROW) are scratch; owner: 0, 1, 2 ..., a slot for
+    each node. Returns (NO_FAULT, 0, 0), or fault, route and slot where there is no derivative.
     """
     body_rootid, cvel, subtree_com = kinematics[6], kinematics[7], kinematics[10]
     for m in range(jacobian.shape[0]):
         for i in range(jacobian.shape[1]):
             jacobian[m, i] = 0.0
+    u, next_use = 0, 0
     for c in range(routes.shape[0]):
         lo, hi = routes[c, R_LO], routes[c, R_HI]
         slots = hi - lo + 2
+        u = next_use
+        while next_use < uses.shape[0] and uses[next_use, U_ROUTE] == c:
+            next_use += 1
+        if seg_count[c] == 0:
+            continue
         for k in range(slots):
             body, x, y, z = _slot(c, k, routes, links, site_xpos, node)
             com = body_rootid[body]
@@ -128,6 +153,10 @@ def length_jacobian_rate(
             for i in range(6):
                 gradient[k, i] = 0.0
                 rate[k, i] = 0.0
+        for use in range(u, next_use):
+            k, a = uses[use, U_NODE] - lo + 1, uses[use, U_AXIS]
+            for i in range(3):
+                twist[k, i] += slopes[a, S_FIRST + i] * qvel[uses[use, U_DOF]]
         _, ox, oy, oz = _slot(c, 0, routes, links, site_xpos, node)
         _, ix, iy, iz = _slot(c, slots - 1, routes, links, site_xpos, node)
         count, fault, where = list_path_points(lo, hi, ox, oy, oz, ix, iy, iz, node, owner, stop)
@@ -135,6 +164,11 @@ def length_jacobian_rate(
             return fault, c, where
         add_gradient(count, stop, gradient)
         add_stiffness_times(count, twist, stop, rate)
+        for use in range(u, next_use):
+            k = uses[use, U_NODE] - lo + 1
+            jacobian[routes[c, R_MUSCLE], uses[use, U_DOF]] += weights[c] * _point_rate(
+                uses[use], k, slopes, qvel, twist, gradient, rate
+            )
         for k in range(slots):
             mx, my, mz = gradient[k, 3], gradient[k, 4], gradient[k, 5]
             wx, wy, wz = twist[k, 3], twist[k, 4], twist[k, 5]

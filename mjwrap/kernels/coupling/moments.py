@@ -11,6 +11,7 @@ import math
 
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE, moment, segment_bodies
+from mjwrap.kernels.coupling.path_points import U_ROUTE, add_point_row
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
 
@@ -53,23 +54,27 @@ def length_jacobian(routes, paths, dofs, jacobian):
 
 
 @jit
-def write_transmissions(routes, paths, dofs, length, velocity, targets, row):
+def write_transmissions(routes, paths, dofs, uses, slopes, length, velocity, targets, row):
     """Write length [m], velocity [m/s] and moment of mjwrap's paths, times the gear, to MuJoCo's own actuators.
 
-    length, velocity (n,): those of the muscles. row (nv,): scratch, zeros before and after. A muscle without a path has
-    its last valid length, velocity and segments. Where some number is not finite, all of the actuator's are zero.
+    uses, slopes: as in `PathPoints`. length, velocity (n,): those of the muscles. row (nv,): scratch, zeros before and
+    after. A muscle without a path has its last valid length, velocity and segments. Where some number is not finite,
+    all of the actuator's are zero.
     """
     rownnz, colind, moment, ten_j = targets.rownnz, targets.colind, targets.moment, targets.ten_j
-    c = 0
+    c, u = 0, 0
     for m in range(targets.output.shape[0]):
         first = c
         while c < routes.rows.shape[0] and routes.rows[c, R_MUSCLE] == m:
             c += 1
         out = targets.output[m]
         if out < 0:
+            while u < uses.shape[0] and uses[u, U_ROUTE] < c:
+                u += 1
             continue
         for r in range(first, c):
             add_row(r, routes, paths, dofs, row)
+        u = add_point_row(u, m, uses, slopes, routes, paths, row)
         factor, shown = targets.gear[out, 0], targets.tendon[m]
         start, place = targets.rowadr[out], targets.tendon_row[m]
         sound = math.isfinite(length[m]) and math.isfinite(velocity[m])

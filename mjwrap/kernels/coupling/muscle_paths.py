@@ -10,6 +10,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import from_python, jit
+from mjwrap.kernels.geometry.traits import sided
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E, G_FAR, G_NEAR, VANISHING, list_segments
 from mjwrap.kernels.spans.chain import solve_chain
 from mjwrap.kernels.spans.end_inside import has_valid_length, list_pulling_segments
@@ -24,7 +25,10 @@ ROUTE = 8
 
 @jit
 def _write_poses(lo, hi, links, poses, node):
-    """Write the present poses, and at a cold start the hints, of nodes lo..hi; return whether one is cold."""
+    """Write the present poses of nodes lo..hi, and their hints at a cold start; return whether one is cold.
+
+    A side that holds at every pose is written at every pose.
+    """
     cold = False
     for k in range(lo, hi):
         row = node[k]
@@ -39,9 +43,10 @@ def _write_poses(lo, hi, links, poses, node):
             row[lay.POS + i] = pos[i]
         for i in range(9):
             row[lay.ROT + i] = rot[i]
-        if row[lay.S_MODE] != lay.COLD:
+        if row[lay.S_MODE] == lay.COLD:
+            cold = True
+        elif not sided(k, node):
             continue
-        cold = True
         hint = links[k, L_HINT]
         if hint >= 0:
             x = poses.site_xpos[hint, 0] - pos[0]
@@ -173,10 +178,10 @@ def _solve_straight(c, routes, poses, paths):
 
 
 @jit
-def solve_routes(routes, poses, paths, tol):
-    """Find path and speed of every route; a route that fails keeps its segments and speed in `paths`."""
+def solve_routes(first, end, routes, poses, paths, tol):
+    """Find path and speed of routes first to end - 1; one that fails keeps its segments and speed in `paths`."""
     node, seg, info, site_xpos = paths.node, paths.segments, paths.info, poses.site_xpos
-    for c in range(routes.rows.shape[0]):
+    for c in range(first, end):
         route = routes.rows[c]
         if route[R_SURFACES] == 0:
             _solve_straight(c, routes, poses, paths)

@@ -13,6 +13,7 @@ from mjwrap.kernels.coupling.drawn_paths import route_contacts, route_points
 from mjwrap.kernels.coupling.groups import Dofs, Paths, Routes
 from mjwrap.kernels.coupling.moments import length_jacobian
 from mjwrap.kernels.coupling.muscle_paths import R_LO, R_MUSCLE
+from mjwrap.kernels.coupling.path_points import add_point_columns
 from mjwrap.kernels.solved.segments import G_A, G_B, G_E
 
 # columns of a force: a point (3) [m], the force (3) [N], 1 if its arrow ends at the point
@@ -78,13 +79,13 @@ def put_state(row, numbers, status, info, all_numbers, all_status, all_iteration
 def put_frame(
     routes, weights, links, node, seg, seg_count, info, tension, spacing, last_dof, dof_parentid, body_rootid, cdof,
     subtree_com, xpos, xquat, muscles, columns, jacobian, t, points, strips, contacts, touches, forces, pulls, arms,
-    positions, quaternions,
+    positions, quaternions, uses, slopes,
 ):  # fmt: skip
     """Write frame t, behind frame t - 1; return whether there was room for all of it.
 
     strips (T, C + 1): first row of each route in points; touches, pulls (T, n + 1): first rows of each muscle in
     contacts and forces. Rows for which there is no room are counted but not written. arms (T, K): moment arms -dl/dq of
-    the pairs (muscles, columns); jacobian (n, nv): scratch.
+    the pairs (muscles, columns); jacobian (n, nv): scratch. uses, slopes: of moving points, as in `PathPoints`.
     """
     point, contact, force = 0, 0, 0
     if t > 0:
@@ -104,12 +105,14 @@ def put_frame(
         muscle += 1
         touches[t, muscle], pulls[t, muscle] = contact, force
     if muscles.shape[0] > 0:
+        chains, paths = Routes(routes, weights, links), Paths(node, seg, seg_count, info)
         length_jacobian(
-            Routes(routes, weights, links),
-            Paths(node, seg, seg_count, info),
+            chains,
+            paths,
             Dofs(last_dof, dof_parentid, body_rootid, cdof, subtree_com),
             jacobian,
         )
+        add_point_columns(uses, slopes, chains, paths, jacobian)
         for k in range(muscles.shape[0]):
             arms[t, k] = -jacobian[muscles[k], columns[k]]
     for body in range(xpos.shape[0]):

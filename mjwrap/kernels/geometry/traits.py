@@ -1,6 +1,7 @@
 """Properties of the surface of a row, read from the row's column TRAITS.
 
-They come from the class of the surface (`mjwrap/surfaces/surface.py`), never from the kind.
+They come from the class of the surface (`mjwrap/surfaces/surface.py`), never from the kind; only `sided` comes from the
+obstacle.
 """
 
 from __future__ import annotations
@@ -45,3 +46,9 @@ def random_starts(k, node):
 def ellipse_sections(k, node):
     """Return whether the surface is an ellipsoid with semi-axes DIM, so that its plane sections are ellipses."""
     return int(node[k, TRAITS]) & lay.ELLIPSE_SECTIONS != 0
+
+
+@jit
+def sided(k, node):
+    """Return whether row k's hint is a side that holds at every pose, not only at a cold start."""
+    return int(node[k, TRAITS]) & lay.SIDED != 0

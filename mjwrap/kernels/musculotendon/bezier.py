@@ -63,16 +63,21 @@ def tabulate(curve: Array) -> tuple[Array, NDArray[np.int16]]:
     The first and last pieces are the straight ones outside the corners; the first one's scale is the number of cells in
     a unit of x. No cell has more than two pieces.
     """
-    start, end = _straight(curve[0], 0.0), _straight(curve[-1], 1.0)
+    pieces = pieces_of(curve)
+    start, inner, end = pieces[0], pieces[1:-1], pieces[-1]
     width = end[MIDDLE] - start[MIDDLE]
     start[SCALE] = CELLS / width
-    inner = _pieces(curve)
     ends = np.concatenate([inner[1:, MIDDLE] - 1.0 / inner[1:, SCALE], end[None, MIDDLE]])
     edges = start[MIDDLE] + width / CELLS * np.arange(CELLS)
     if np.diff(ends).min() * start[SCALE] < 1.0:
         raise ValueError("a piece is narrower than a cell")
     cells = 1 + np.searchsorted(ends[:-1], edges, side="right")
-    return np.vstack([start, inner, end]), cells.astype(np.int16)
+    return pieces, cells.astype(np.int16)
+
+
+def pieces_of(curve: Array) -> Array:
+    """Return a curve's pieces (n, 2 + DEGREE + 1); the first and the last are the straight ones outside the corners."""
+    return np.vstack([_straight(curve[0], 0.0), _pieces(curve), _straight(curve[-1], 1.0)])
 
 
 def _straight(corner: Array, u: float) -> Array:

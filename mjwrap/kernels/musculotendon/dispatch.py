@@ -4,6 +4,9 @@ Each law has a file with its mathematics, and a line in each function below that
 fills its columns of `params`. No other kernel compares codes. A code that is not listed gives NaN, and the muscle gets
 the status NON_FINITE.
 
+Where a muscle has curves of its own, the functions of curves take their address in place of the code: `curve_set`
+returns what to give them.
+
 Fibre lengths in l_o, fibre velocities in v_max l_o, tendon lengths in l_s, forces in F_max.
 """
 
@@ -12,18 +15,35 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels.compilation.jit import from_python, jit
-from mjwrap.kernels.musculotendon import degroote_fregly, millard, mujoco_muscle, path_actuator
+from mjwrap.kernels.musculotendon import (
+    degroote_fregly,
+    ligament,
+    millard,
+    mujoco_muscle,
+    own_curves,
+    path_actuator,
+    path_spring,
+    thelen,
+)
+from mjwrap.kernels.musculotendon.curve_memory import LEAST_ADDRESS, read
 
 PATH_ACTUATOR = path_actuator.CODE
 MUJOCO = mujoco_muscle.CODE
 DEGROOTE_FREGLY = degroote_fregly.CODE
 MILLARD = millard.CODE
+THELEN = thelen.CODE
+LIGAMENT = ligament.CODE
+PATH_SPRING = path_spring.CODE
 PARAMS = 21  # number of columns of the table of parameters
 
-WITH_FIBER = (DEGROOTE_FREGLY, MILLARD)
-WITHOUT_FIBER = (PATH_ACTUATOR, MUJOCO)
+CURVES = 9  # column of the address of a muscle's own curves, 0 where it has those of its law; laws with a fibre only
+
+WITH_FIBER = (DEGROOTE_FREGLY, MILLARD, THELEN)
+WITHOUT_FIBER = (PATH_ACTUATOR, MUJOCO, LIGAMENT, PATH_SPRING)
+PASSIVE = (LIGAMENT, PATH_SPRING)
 # laws whose tendon curve is an exponential: the search for a balance takes its logarithm
 EXPONENTIAL_TENDON = (DEGROOTE_FREGLY,)
+LONGEST_START = 1.08  # [l_s] longest tendon with which an iteration starts, for curves that are not a muscle's own
 NAN = math.nan
 
 
@@ -37,6 +57,12 @@ def is_law_code(law):
 def has_fiber(law):
     """Return whether a law has a fibre and a tendon, rigid or elastic."""
     return law in WITH_FIBER
+
+
+@jit
+def is_passive(law):
+    """Return whether a law's tension does not depend on activation, and it stores energy without a fibre."""
+    return law in PASSIVE
 
 
 @jit
@@ -55,10 +81,47 @@ def fiberless_tension(law, params, m, activation, length, speed):
         return mujoco_muscle.tension(params, m, activation, length, speed)
     if law == PATH_ACTUATOR:
         return path_actuator.tension(params, m, activation)
+    if law == LIGAMENT:
+        return ligament.tension(params, m, length)
+    if law == PATH_SPRING:
+        return path_spring.tension(params, m, length, speed)
     return NAN
 
 
+@jit
+def fiberless_energy(law, params, m, length):
+    """Return the energy [J] that a law without a fibre stores at a length [m]."""
+    if law == LIGAMENT:
+        return ligament.energy(params, m, length)
+    if law == PATH_SPRING:
+        return path_spring.energy(params, m, length)
+    return 0.0
+
+
+@jit
+def fiberless_elastic_tension(law, params, m, length):
+    """Return the slope of `fiberless_energy` in length [N]: the tension without its damping."""
+    if law == LIGAMENT:
+        return ligament.tension(params, m, length)
+    if law == PATH_SPRING:
+        return path_spring.tension(params, m, length, 0.0)
+    return 0.0
+
+
 # ------------------------------------------------------------------------- curves of laws with a fibre
+
+
+@from_python
+def curve_set(law, params, m):
+    """Return what the functions below take for the curves of muscle m: the code of its law, or an address."""
+    address = params[m, CURVES]
+    return int(address) if address >= LEAST_ADDRESS else int(law)
+
+
+@jit
+def longest_start(law):
+    """Return the longest tendon [l_s] with which a search for a balance starts."""
+    return read(law, own_curves.LONGEST_START) if law >= LEAST_ADDRESS else LONGEST_START
 
 
 @from_python
@@ -72,26 +135,44 @@ def length_curves(law, x):
         active, d_active = degroote_fregly.active(x)
         passive, d_passive = degroote_fregly.passive(x)
         return active, d_active, passive, d_passive
+    if law >= LEAST_ADDRESS:
+        return own_curves.length_curves(law, x)
     return NAN, NAN, NAN, NAN
 
 
 @from_python
+def velocity_force(law, activation, v):
+    """Return the force-velocity curve at v [v_max l_o], and its slopes in v and in activation."""
+    if law >= LEAST_ADDRESS:
+        return own_curves.velocity_force(law, activation, v)
+    force, slope = velocity_curve(law, v)
+    return force, slope, 0.0
+
+
+@from_python
 def velocity_curve(law, v):
-    """Return the force-velocity curve and its slope at fibre velocity v [v_max l_o]."""
+    """Return the force-velocity curve and its slope at fibre velocity v [v_max l_o]; Thelen's at full activation.
+
+    `velocity_force` is the curve at any activation, which changes Thelen's only.
+    """
     if law == MILLARD:
         return millard.velocity(v)
     if law == DEGROOTE_FREGLY:
         return degroote_fregly.velocity(v)
+    if law >= LEAST_ADDRESS:
+        return own_curves.velocity_curve(law, v)
     return NAN, NAN
 
 
 @jit
 def inverse_velocity(law, force):
-    """Return the fibre velocity [v_max l_o] at which the force-velocity curve has a value."""
+    """Return the fibre velocity [v_max l_o] at which `velocity_curve` has a value."""
     if law == MILLARD:
         return millard.inverse_velocity(force)
     if law == DEGROOTE_FREGLY:
         return degroote_fregly.inverse_velocity(force)
+    if law >= LEAST_ADDRESS:
+        return own_curves.inverse_velocity(law, force)
     return NAN
 
 
@@ -105,7 +186,21 @@ def law_balancing_velocity(law, strength, damping, wanted, close):
         return millard.balancing_velocity(strength, damping, wanted, close)
     if law == DEGROOTE_FREGLY:
         return degroote_fregly.balancing_velocity(strength, damping, wanted, close)
+    if law >= LEAST_ADDRESS:
+        return own_curves.balancing_velocity(law, strength, damping, wanted, close)
     return NAN, NAN, NAN
+
+
+@jit
+def balancing_velocity_force(law, activation, strength, damping, wanted, close):
+    """Return v with strength f_v(v) + damping v = wanted at an activation, f_v, and its slopes in v and activation.
+
+    Arguments as of `law_balancing_velocity`.
+    """
+    if law >= LEAST_ADDRESS:
+        return own_curves.balancing_velocity_force(law, activation, strength, damping, wanted, close)
+    v, force, slope = law_balancing_velocity(law, strength, damping, wanted, close)
+    return v, force, slope, 0.0
 
 
 @jit
@@ -117,6 +212,8 @@ def tendon_curve(law, x):
         return millard.tendon(x)
     if law == DEGROOTE_FREGLY:
         return degroote_fregly.tendon(x)
+    if law >= LEAST_ADDRESS:
+        return own_curves.tendon_curve(law, x)
     return NAN, NAN
 
 
@@ -127,6 +224,8 @@ def passive_energy(law, x):
         return millard.passive_energy(x)
     if law == DEGROOTE_FREGLY:
         return degroote_fregly.passive_energy(x)
+    if law >= LEAST_ADDRESS:
+        return own_curves.passive_energy(law, x)
     return NAN
 
 
@@ -139,4 +238,6 @@ def tendon_energy(law, x):
         return millard.tendon_energy(x)
     if law == DEGROOTE_FREGLY:
         return degroote_fregly.tendon_energy(x)
+    if law >= LEAST_ADDRESS:
+        return own_curves.tendon_energy(law, x)
     return NAN

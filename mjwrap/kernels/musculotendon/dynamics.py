@@ -12,11 +12,12 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.musculotendon.actearly import next_activation
-from mjwrap.kernels.musculotendon.activation_dynamics import advance, rate
+from mjwrap.kernels.musculotendon.activation_dynamics import advance_above, rate_above
 from mjwrap.kernels.musculotendon.dispatch import has_fiber
 from mjwrap.kernels.musculotendon.fiber import (
     ELASTIC,
     LEAST,
+    MIN_ACTIVATION,
     equilibrium,
     rigid_fiber,
     step_fiber,
@@ -91,6 +92,12 @@ def is_elastic(law, params, m):
 
 
 @jit
+def least_activation(law, params, m):
+    """Return the activation below which that of muscle m does not fall."""
+    return params[m, MIN_ACTIVATION] if has_fiber(law) else 0.0
+
+
+@jit
 def drive_muscles(muscles, timing, start, states):
     """Write every muscle's tension, and its state at the end of the step, into `states`, which has length and speed.
 
@@ -109,10 +116,11 @@ def drive_muscles(muscles, timing, start, states):
     duration = since + ahead
     for m in range(law.shape[0]):
         a, end = start.activation[m], start.activation[m]
+        least = least_activation(law[m], params, m)
         if (source[m] == STATE_IN_MJWRAP or source[m] == STATE_IN_ACT) and not off[m]:
-            a = advance(form[m], end, start.drive[m], times[m, 0], times[m, 1], times[m, 2], since)
+            a = advance_above(form[m], end, start.drive[m], times, m, least, since)
             if ahead > 0.0:
-                end = advance(form[m], end, start.drive[m], times[m, 0], times[m, 1], times[m, 2], duration)
+                end = advance_above(form[m], end, start.drive[m], times, m, least, duration)
             else:
                 end = a
         if since <= 0.0:
@@ -137,7 +145,7 @@ def drive_muscles(muscles, timing, start, states):
             if off[m] or duration <= 0.0:
                 force = tendon_force(law[m], params, m, length[m], fiber[m])
             else:
-                growth = rate(form[m], start.drive[m], end, times[m, 0], times[m, 1], times[m, 2])
+                growth = rate_above(form[m], start.drive[m], end, times, m, least)
                 next_fiber[m], force, _, _ = step_fiber(
                     law[m], params, m, start.activation[m], end, growth,
                     start.length[m], length[m] + ahead * velocity[m], velocity[m], start.fiber[m], duration,
@@ -176,7 +184,7 @@ def simulate(
     the start (NO_FIBER: equilibrium). activation, fiber and tension (T,) are filled, and counts (T, 2) with evaluations
     and status of each step.
     """
-    elastic = is_elastic(law, params, 0)
+    elastic, least = is_elastic(law, params, 0), least_activation(law, params, 0)
     if prescribed:
         activation[0] = drive[0]
     for k in range(time.shape[0]):
@@ -186,8 +194,8 @@ def simulate(
             activation[k] = drive[k]
             if not prescribed:
                 u = drive[k - 1]
-                activation[k] = advance(form, activation[k - 1], u, times[0], times[1], times[2], duration)
-                rise = rate(form, u, activation[k], times[0], times[1], times[2])
+                activation[k] = advance_above(form, activation[k - 1], u, times, 0, least, duration)
+                rise = rate_above(form, u, activation[k], times, 0, least)
         if not elastic:
             tension[k] = law_tension(law, params, 0, activation[k], length[k], velocity[k])
             fiber[k] = rigid_fiber(params, 0, length[k]) if has_fiber(law) else NO_FIBER

@@ -1,6 +1,6 @@
 """Balance of fibre and tendon: forces and their slopes, and the fibre length or velocity at which they balance.
 
-Lengths in l_o, velocities in v_max l_o, forces in F_max; tendon lengths in l_s.
+Lengths in l_o, velocities in v_max l_o, forces in F_max; tendon lengths in l_s. law: what `dispatch.curve_set` returns.
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ import math
 
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon.dispatch import (
+    balancing_velocity_force,
     exponential_tendon,
-    law_balancing_velocity,
     length_curves,
+    longest_start,
     tendon_curve,
-    velocity_curve,
+    velocity_force,
 )
 
 # statuses
@@ -27,7 +28,6 @@ MAX_EVALUATIONS = 150  # most evaluations of one solution; a step of a simulatio
 NEAR_BALANCE = 1e-6
 # ... if that step changes the tendon by at most this [l_s]; the curvature of a tendon curve is at most 2e3
 LAST_STEP = 1e-6
-LONGEST_START = 1.08  # [l_s] longest tendon with which an iteration starts
 # [F_max] imbalance above which the step of an exponential tendon is taken in logarithms of the forces ...
 LOG_IMBALANCE = 0.2
 LOG_OFFSET = 0.2  # [F_max] ... to which this is added
@@ -38,17 +38,17 @@ MAX_VELOCITY = 100.0  # [v_max l_o] bound of the fibre velocity, where no force 
 
 
 @jit
-def balancing_velocity(law, strength, damping, wanted, close):
-    """Return v with strength f_v(v) + damping v = wanted, within a bound, and f_v and its slope there.
+def balancing_velocity(law, activation, strength, damping, wanted, close):
+    """Return v with strength f_v(v) + damping v = wanted, within a bound, f_v, and its slopes in v and activation.
 
     close: largest last Newton step; the error left is its square.
     """
     if damping == 0.0 and strength == 0.0:
         v = MAX_VELOCITY if wanted > 0.0 else (-MAX_VELOCITY if wanted < 0.0 else 0.0)
-        force, slope = velocity_curve(law, v)
-        return v, force, slope
-    v, force, slope = law_balancing_velocity(law, strength, damping, wanted, close)
-    return min(max(v, -MAX_VELOCITY), MAX_VELOCITY), force, slope
+        force, slope, growth = velocity_force(law, activation, v)
+        return v, force, slope, growth
+    v, force, slope, growth = balancing_velocity_force(law, activation, strength, damping, wanted, close)
+    return min(max(v, -MAX_VELOCITY), MAX_VELOCITY), force, slope, growth
 
 
 @jit
@@ -62,10 +62,8 @@ def forces(law, activation, damping, height, ratio, unit_length, x, v):
     along = math.sqrt(x * x - height * height)
     pull, stiffness = tendon_curve(law, unit_length - ratio * along)
     curves = length_curves(law, x)
-    speed, d_speed = velocity_curve(law, v)
-    return _combine_curves(
-        activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed
-    )
+    speeds = velocity_force(law, activation, v)
+    return _combine_curves(activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speeds)
 
 
 @jit
@@ -79,19 +77,23 @@ def balanced_forces(law, activation, damping, height, ratio, unit_length, x, lea
     pull, stiffness = tendon_curve(law, unit_length - ratio * along)
     curves = length_curves(law, x)
     wanted = pull * x / along - curves[2]
-    v, speed, d_speed = balancing_velocity(law, activation * curves[0], damping, wanted, close)
+    v, speed, d_speed, growth = balancing_velocity(
+        law, activation, activation * curves[0], damping, wanted, close
+    )
     if v < 0.0 and x <= least:
         v = 0.0
-        speed, d_speed = velocity_curve(law, v)
+        speed, d_speed, growth = velocity_force(law, activation, v)
+    speeds = speed, d_speed, growth
     return v, _combine_curves(
-        activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed
+        activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speeds
     )
 
 
 @jit
-def _combine_curves(activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speed, d_speed):
+def _combine_curves(activation, damping, height, ratio, x, v, along, pull, stiffness, curves, speeds):
     """Return the results of `forces` from the values and slopes of the curves."""
     active, d_active, passive, d_passive = curves
+    speed, d_speed, growth = speeds
     cosine = along / x
     strength = active * speed
     force = activation * strength + passive + damping * v
@@ -100,7 +102,7 @@ def _combine_curves(activation, damping, height, ratio, x, v, along, pull, stiff
     drag = (activation * active * d_speed + damping) * cosine
     return (
         pull, -stiffness * ratio / cosine, force * cosine, slope * cosine + turning,
-        stiffness, strength * cosine, drag,
+        stiffness, (strength + activation * active * growth) * cosine, drag,
     )  # fmt: skip
 
 
@@ -127,7 +129,7 @@ def balance(law, activation, damping, height, ratio, unit_length, before, rate, 
     along = max(unit_length - 1.0, 0.0) / ratio
     # fibre length at which the tendon has its slack length
     slack = math.sqrt(along * along + height * height)
-    along = max(unit_length - LONGEST_START, 0.0) / ratio
+    along = max(unit_length - longest_start(law), 0.0) / ratio
     shortest_start = min(max(math.sqrt(along * along + height * height), low), high)
     x = max(x, shortest_start)
     for k in range(1, MAX_EVALUATIONS + 1):

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from mjwrap.kernels.compilation.jit import jit
-from mjwrap.kernels.musculotendon.dispatch import length_curves, tendon_curve, velocity_curve
+from mjwrap.kernels.compilation.jit import from_python, jit
+from mjwrap.kernels.musculotendon.dispatch import CURVES, curve_set, length_curves, tendon_curve, velocity_force
 from mjwrap.kernels.musculotendon.equilibrium import (
     AT_MINIMUM,
     MAX_EVALUATIONS,
@@ -26,8 +26,10 @@ from mjwrap.kernels.musculotendon.equilibrium import (
 from mjwrap.kernels.musculotendon.third_order_step import advance_third_order
 
 # Columns of params: F_max [N], l_o [m], l_s [m], pennation at l_o [rad], v_max [l_o/s], fibre damping [F_max per v_max
-# l_o], 1 where the tendon is elastic, fibre height [m], shortest fibre length [m].
+# l_o], 1 where the tendon is elastic, fibre height [m], shortest fibre length [m]; CURVES of `dispatch.py`; the least
+# activation, which a smaller one counts as.
 F_MAX, OPTIMAL, SLACK, PENNATION, V_MAX, DAMPING, ELASTIC, HEIGHT, LEAST = range(9)
+MIN_ACTIVATION = CURVES + 1
 
 # [v_max] largest last Newton step of `fiber_rate` for a velocity; the error that is left is its square
 LAST_VELOCITY_STEP = 1e-8
@@ -38,6 +40,12 @@ SINGLE_ROOT = 2.0
 
 
 # ------------------------------------------------------------------------------------- forces, SI units
+
+
+@from_python
+def held_activation(params, m, activation):
+    """Return the activation within the least one of muscle m and 1."""
+    return min(max(activation, params[m, MIN_ACTIVATION]), 1.0)
 
 
 @jit
@@ -53,9 +61,10 @@ def _along_fiber(law, params, m, activation, fiber, fiber_speed):
     """Return the fibre force along the fibre [N]; arguments as of `fiber_force`."""
     optimal = params[m, OPTIMAL]
     v = fiber_speed / (params[m, V_MAX] * optimal)
-    active, _, passive, _ = length_curves(law, fiber / optimal)
-    speed, _ = velocity_curve(law, v)
-    activation = min(max(activation, 0.0), 1.0)
+    curves = curve_set(law, params, m)
+    active, _, passive, _ = length_curves(curves, fiber / optimal)
+    activation = held_activation(params, m, activation)
+    speed, _, _ = velocity_force(curves, activation, v)
     return params[m, F_MAX] * (activation * active * speed + passive + params[m, DAMPING] * v)
 
 
@@ -64,7 +73,7 @@ def tendon_force(law, params, m, length, fiber):
     """Return the tension of an elastic tendon [N] from the lengths of unit and fibre [m]; zero where it is slack."""
     height = params[m, HEIGHT]
     along = math.sqrt(max(fiber * fiber - height * height, 0.0))
-    force, _ = tendon_curve(law, (length - along) / params[m, SLACK])
+    force, _ = tendon_curve(curve_set(law, params, m), (length - along) / params[m, SLACK])
     return params[m, F_MAX] * force
 
 
@@ -105,8 +114,8 @@ def advance_fiber(law, params, m, activation, length, fiber, duration):
     before = max(fiber / optimal, least)
     high = max(_fiber_at_slack_length(params, m, length), before)
     x, pull, count, status = balance(
-        law, min(max(activation, 0.0), 1.0), params[m, DAMPING], height, optimal / slack, length / slack,
-        before, 1.0 / (duration * params[m, V_MAX]), least, high, before, NEAR_BALANCE,
+        curve_set(law, params, m), held_activation(params, m, activation), params[m, DAMPING], height,
+        optimal / slack, length / slack, before, 1.0 / (duration * params[m, V_MAX]), least, high, before, NEAR_BALANCE,
     )  # fmt: skip
     return x * optimal, pull * params[m, F_MAX], count, status
 
@@ -135,9 +144,9 @@ def step_fiber(
     optimal, slack, damping = params[m, OPTIMAL], params[m, SLACK], params[m, DAMPING]
     height, least = params[m, HEIGHT] / optimal, params[m, LEAST] / optimal
     start = max(fiber / optimal, least)
-    activation_before = min(max(activation_before, 0.0), 1.0)
-    activation = min(max(activation, 0.0), 1.0)
-    unit = (law, activation, damping, height, optimal / slack, length / slack)
+    activation_before = held_activation(params, m, activation_before)
+    activation = held_activation(params, m, activation)
+    unit = (curve_set(law, params, m), activation, damping, height, optimal / slack, length / slack)
     increments = (activation - activation_before, (length - length_before) / slack)
     end_rates = (duration * activation_rate, duration * speed / slack)
     high = max(_fiber_at_slack_length(params, m, length), start)
@@ -180,19 +189,20 @@ def equilibrium(law, params, m, activation, length):
     optimal, slack = params[m, OPTIMAL], params[m, SLACK]
     height, low = params[m, HEIGHT] / optimal, params[m, LEAST] / optimal
     ratio, unit_length = optimal / slack, length / slack
-    activation = min(max(activation, 0.0), 1.0)
+    activation = held_activation(params, m, activation)
+    curves = curve_set(law, params, m)
     along = max(length - slack, 0.0) / optimal
     high = math.sqrt(along * along + height * height)
-    off, slope = rest_imbalance(law, activation, height, ratio, unit_length, low)
+    off, slope = rest_imbalance(curves, activation, height, ratio, unit_length, low)
     if off <= 0.0 or high <= low:
         return low * optimal, 1, AT_MINIMUM if off < 0.0 else SLACK_TENDON
     count = 1
     while low < high:
         new = min(low + ROOT_SPACING, high) if low < SINGLE_ROOT else high
-        off, d_new = rest_imbalance(law, activation, height, ratio, unit_length, new)
+        off, d_new = rest_imbalance(curves, activation, height, ratio, unit_length, new)
         count += 1
         if off > 0.0 and slope < 0.0 and d_new > 0.0:
-            new, off, more = _lowest(law, activation, height, ratio, unit_length, low, new)
+            new, off, more = _lowest(curves, activation, height, ratio, unit_length, low, new)
             count += more
         if off <= 0.0:
             break
@@ -200,7 +210,7 @@ def equilibrium(law, params, m, activation, length):
     else:
         return high * optimal, count, NORMAL  # rounding at the slack length itself
     x, _, more, status = balance(
-        law, activation, 0.0, height, ratio, unit_length, low, 0.0, low, new, 0.5 * (low + new), 0.0
+        curves, activation, 0.0, height, ratio, unit_length, low, 0.0, low, new, 0.5 * (low + new), 0.0
     )
     return x * optimal, count + more, status
 
@@ -234,13 +244,14 @@ def fiber_rate(law, params, m, activation, length, fiber):
     the bound of 100 maximum contraction velocities is returned.
     """
     optimal, slack, damping = params[m, OPTIMAL], params[m, SLACK], params[m, DAMPING]
-    activation = min(max(activation, 0.0), 1.0)
+    activation = held_activation(params, m, activation)
+    curves = curve_set(law, params, m)
     x, height = fiber / optimal, params[m, HEIGHT] / optimal
     along = math.sqrt(max(x * x - height * height, 0.0))
-    pull, _ = tendon_curve(law, (length - along * optimal) / slack)
-    active, _, passive, _ = length_curves(law, x)
+    pull, _ = tendon_curve(curves, (length - along * optimal) / slack)
+    active, _, passive, _ = length_curves(curves, x)
     wanted = pull * x / along - passive if along > 0.0 else math.inf  # at a right angle
-    v, _, _ = balancing_velocity(law, activation * active, damping, wanted, LAST_VELOCITY_STEP)
+    v, _, _, _ = balancing_velocity(curves, activation, activation * active, damping, wanted, LAST_VELOCITY_STEP)
     if fiber <= params[m, LEAST] and v < 0.0:
         return 0.0
     return v * params[m, V_MAX] * optimal

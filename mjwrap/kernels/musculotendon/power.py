@@ -18,11 +18,15 @@ from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.musculotendon import fiber
 from mjwrap.kernels.musculotendon import tension as muscle
 from mjwrap.kernels.musculotendon.dispatch import (
+    curve_set,
+    fiberless_elastic_tension,
+    fiberless_energy,
     has_fiber,
+    is_passive,
     length_curves,
     passive_energy,
     tendon_energy,
-    velocity_curve,
+    velocity_force,
 )
 from mjwrap.kernels.musculotendon.fiber import DAMPING, ELASTIC, F_MAX, HEIGHT, LEAST, OPTIMAL, SLACK, V_MAX
 from mjwrap.kernels.musculotendon.umberger import metabolic_power
@@ -69,9 +73,10 @@ def powers(law, params, m, activation, length, speed, fiber_length, constants, e
         law, params, m, activation, length, speed, fiber_length
     )
     x, v = now / optimal, velocity / (params[m, V_MAX] * optimal)
-    multiplier, _, passive, _ = length_curves(law, x)
-    rate, _ = velocity_curve(law, v)
-    active = f_max * min(max(activation, 0.0), 1.0) * multiplier * rate
+    curves, activation = curve_set(law, params, m), fiber.held_activation(params, m, activation)
+    multiplier, _, passive, _ = length_curves(curves, x)
+    rate, _, _ = velocity_force(curves, activation, v)
+    active = f_max * activation * multiplier * rate
     passive *= f_max
     damped = f_max * params[m, DAMPING] * v
 
@@ -83,9 +88,9 @@ def powers(law, params, m, activation, length, speed, fiber_length, constants, e
     out[MUSCLE, m] = -tension * speed
     if params[m, ELASTIC] != 0.0:
         out[TENDON, m] = -tension * (speed - velocity / cosine)
-        out[TENDON_ENERGY, m] = f_max * params[m, SLACK] * tendon_energy(law, tendon / params[m, SLACK])
+        out[TENDON_ENERGY, m] = f_max * params[m, SLACK] * tendon_energy(curves, tendon / params[m, SLACK])
     out[UNBALANCED, m] = (active + passive + damped - tension / cosine) * velocity
-    out[FIBER_ENERGY, m] = f_max * optimal * passive_energy(law, x)
+    out[FIBER_ENERGY, m] = f_max * optimal * passive_energy(curves, x)
     started, maintained, shortening, resting, work, total = metabolic_power(
         constants, m, activation, excitation, x, v, multiplier, out[ACTIVE, m]
     )
@@ -101,7 +106,8 @@ def powers(law, params, m, activation, length, speed, fiber_length, constants, e
 def energetics(law, params, activation, excitation, length, speed, fiber_length, constants, out):
     """Fill out (OUTPUTS, n) for all muscles; arrays (n,), params (n, PARAMS), constants (n, CONSTANTS: `umberger.py`).
 
-    Laws without fibres (MuJoCo's muscle, the path actuator) have only the power delivered to the skeleton.
+    Laws without fibres have the power delivered to the skeleton. What springs and ligaments store and deliver stands
+    in the rows of the tendon, and what they dissipate in those of the damping and the fibre.
     """
     out[:] = 0.0
     for m in range(law.shape[0]):
@@ -112,3 +118,7 @@ def energetics(law, params, activation, excitation, length, speed, fiber_length,
             )  # fmt: skip
         else:
             out[MUSCLE, m] = -speed[m] * muscle.tension(law[m], params, m, activation[m], length[m], speed[m])
+            if is_passive(law[m]):
+                out[TENDON, m] = -speed[m] * fiberless_elastic_tension(law[m], params, m, length[m])
+                out[TENDON_ENERGY, m] = fiberless_energy(law[m], params, m, length[m])
+                out[DAMPED, m] = out[FIBER, m] = out[MUSCLE, m] - out[TENDON, m]

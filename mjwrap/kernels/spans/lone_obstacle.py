@@ -6,6 +6,7 @@ import math
 
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
+from mjwrap.kernels.geometry.traits import sided
 from mjwrap.kernels.spans.active_set_method import ends_in_short_segment
 from mjwrap.kernels.spans.cold_start import path_length
 from mjwrap.kernels.spans.lift_off_touchdown import follow_branch, in_range
@@ -19,13 +20,15 @@ S_MODE, W_OLD = lay.S_MODE, lay.W_OLD
 
 @jit
 def solve_lone_obstacle(k, ends, node, tol):
-    """Find the path over obstacle k alone, whose wrap has a closed form, on its saved branch.
+    """Find the path over obstacle k alone, whose wrap has a closed form, on its saved branch or its side.
 
     Returns (whether the path passes the checks of `solve_active_set`, length [m], ||f||). Where it does not, the saved
     solution is left as it was.
     """
     hi = k + 1
     save_solutions(k, hi, node, W_OLD)
+    if sided(k, node):  # its side follows from the pose, not from the branch
+        node[k, S_MODE] = lay.COLD
     good = (
         wrap(k, node, ends[0], ends[1], ends[2], ends[3], ends[4], ends[5], ends[6], ends[7], ends[8], False)
         == 0

@@ -17,7 +17,7 @@ from numba.core import types
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.projection import turn_into_frame
-from mjwrap.kernels.geometry.traits import branched, closed_form
+from mjwrap.kernels.geometry.traits import branched, closed_form, sided
 from mjwrap.kernels.geometry.winding import TWO_PI, nearest_turn
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
@@ -26,6 +26,8 @@ from mjwrap.kernels.spans.hinted_sides import meet_hints
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
+from mjwrap.kernels.spans.sided_start import start_from_sides
+from mjwrap.kernels.wraps.sides import all_sided, any_sided, forget
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
@@ -227,7 +229,7 @@ def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
         iterations += i
         evaluations += e
         if status == lay.CONVERGED and _any_hinted(lo, hi, node):
-            status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error)
+            status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error, False)
             iterations += i
             evaluations += e
         if status == lay.CONVERGED and _is_unwound(lo, hi, node):
@@ -241,31 +243,63 @@ def solve_by_continuation(lo, hi, ends, node, tol, direct, found):
     return status, total, error, iterations, evaluations
 
 
+@deferred(types.int64, types.float64, types.float64, types.int64, types.int64)
+def _solve_without_hints(lo, hi, ends, node, tol, direct):
+    """Search once more from a cold start that ignores the hints of surfaces without a closed form.
+
+    On the allowed side of such a surface a path may be about to slip off, where no search ends.
+    """
+    forget(lo, hi, node)
+    for k in range(lo, hi):
+        if not closed_form(k, node):
+            node[k, lay.HINT] = -abs(node[k, lay.HINT])
+    return solve_active_set(lo, hi, ends, node, tol, direct)
+
+
 @jit
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     replaces it by the new one; a path that is lost is searched for as at a cold start. With `direct` a lone obstacle is
-    wrapped in closed form; of its saved solution only the branch is used. Where an end lies inside a surface, length,
+    wrapped in closed form; of its saved solution only the branch is used. Of a span whose sides all hold at every pose
+    nothing saved is used. Where an end lies inside a surface, length,
     error and saved solution are those of the substitute path (`end_inside.py`), which is the path where the end is as
     little inside as a rounded number may put it.
     """
     warm = not any_in_mode(lo, hi, node, COLD)
-    if direct and warm and hi - lo == 1 and closed_form(lo, node):
+    if warm and hi - lo == 1 and closed_form(lo, node) and (direct or sided(lo, node)):
         good, total, error = solve_lone_obstacle(lo, ends, node, tol)
         if good:
             return lay.CONVERGED, total, error, 0, 1
+    # a side that holds at every pose: the path must not depend on the one before
+    held = any_sided(lo, hi, node)
+    if held and all_sided(lo, hi, node):
+        warm = False
+        forget(lo, hi, node)
+        if hi > surface_end(lo, hi, node):
+            start_from_sides(lo, hi, ends, node)
     # Newton's method writes the error of its first evaluation here; `_moved_far` reads it
     node[lo, W_START_ERROR] = -1.0
     status, total, error, iterations, evaluations = solve_active_set(lo, hi, ends, node, tol, direct)
     if not warm and status == lay.CONVERGED and _any_hinted(lo, hi, node):
-        status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error)
+        status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error, False)
         return status, total, error, iterations + i, evaluations + e
     if _is_found(status) and not (warm and _moved_far(lo, hi, ends, node)):
+        if held and warm and status == lay.CONVERGED:
+            status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error, True)
+            return status, total, error, iterations + i, evaluations + e
         return status, total, error, iterations, evaluations
     if warm and status != lay.ENDPOINT_INSIDE:
         status, total, error, i, e = solve_by_continuation(lo, hi, ends, node, tol, direct, _is_found(status))
+        iterations += i
+        evaluations += e
+        if held and status == lay.CONVERGED:
+            status, total, error, i, e = meet_hints(lo, hi, ends, node, tol, total, error, True)
+            iterations += i
+            evaluations += e
+    if held and not warm and (status == lay.NOT_CONVERGED or status == lay.NOT_MINIMAL):
+        status, total, error, i, e = _solve_without_hints(lo, hi, ends, node, tol, direct)
         iterations += i
         evaluations += e
     if status == lay.ENDPOINT_INSIDE:

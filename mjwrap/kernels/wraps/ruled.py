@@ -17,8 +17,10 @@ from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.closed_forms import cone_angle
 from mjwrap.kernels.geometry.elliptic_cylinder import ellipse_arc
+from mjwrap.kernels.geometry.traits import sided
 from mjwrap.kernels.geometry.winding import TWO_PI, tangents_sweep, unwrap_angle
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
+from mjwrap.kernels.wraps.sides import side_sweep
 
 DIM, HINT = lay.DIM, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
@@ -104,12 +106,17 @@ def _hinted_sweep(ax, ay, bx, by, principal, alpha_a, alpha_b, hint_x, hint_y, r
 @jit
 def _hinted(k, node):
     """Return whether a hint chooses the side of row k's surface, which it does at a cold start only."""
-    return node[k, S_MODE] == lay.COLD and node[k, HINT] > 0.0
+    return node[k, S_MODE] == lay.COLD and node[k, HINT] > 0.0 and not sided(k, node)
 
 
 @jit
-def _sweep(k, node, ax, ay, bx, by):
-    """Return the angle that the string sweeps about the axis, on the saved branch, else the shorter way [rad]."""
+def _sweep(k, node, ax, ay, bx, by, a, b):
+    """Return the angle that the string sweeps about the axis, on the saved branch, else the shorter way [rad].
+
+    The points are divided by (a, b). At a cold start a side that holds at every pose decides.
+    """
+    if node[k, S_MODE] == lay.COLD and sided(k, node):
+        return side_sweep(k, node, ax, ay, bx, by, a, b)
     sweep = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     return sweep if node[k, S_MODE] == lay.COLD else unwrap_angle(sweep, node[k, S_SWEEP])
 
@@ -155,7 +162,7 @@ def wrap_cylinder(k, ax, ay, az, bx, by, bz, node):
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
     least = LEAST_TANGENT * radius
     root_a, root_b = tangent_length(square_a - square, least), tangent_length(square_b - square, least)
-    sweep = _sweep(k, node, ax, ay, bx, by)
+    sweep = _sweep(k, node, ax, ay, bx, by, 1.0, 1.0)
     if _hinted(k, node):
         alpha_a, alpha_b = math.atan2(root_a, radius), math.atan2(root_b, radius)
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
@@ -197,7 +204,7 @@ def wrap_elliptic_cylinder(k, ax, ay, az, bx, by, bz, node):
     inside = (A_INSIDE if square_a < limit else 0) + (B_INSIDE if square_b < limit else 0)
     root_a = _tangent_to_ellipse(px, py, square_a, a, b)
     root_b = _tangent_to_ellipse(qx, qy, square_b, a, b)
-    sweep = _sweep(k, node, px, py, qx, qy)
+    sweep = _sweep(k, node, px, py, qx, qy, a, b)
     if _hinted(k, node):
         hint_x, hint_y = node[k, HINT + 1] / a, node[k, HINT + 2] / b
         sweep = _hinted_sweep(
@@ -255,7 +262,7 @@ def wrap_cone(k, ax, ay, az, bx, by, bz, node):
     alpha_a, root_a = _tangent_ruling(rho_a, radius_a)
     alpha_b, root_b = _tangent_ruling(rho_b, radius_b)
     principal = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    sweep = _sweep(k, node, ax, ay, bx, by)
+    sweep = _sweep(k, node, ax, ay, bx, by, 1.0, 1.0)
     if _hinted(k, node):
         hint_x, hint_y = node[k, HINT + 1], node[k, HINT + 2]
         radius = max(radius_a, radius_b)

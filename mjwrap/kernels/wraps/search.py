@@ -26,7 +26,7 @@ from mjwrap.kernels.geometry.dispatch import (
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
-from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided
+from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided, sided
 from mjwrap.kernels.geometry.winding import unwrap_angle
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED
 from mjwrap.kernels.wraps.end_on_surface import (
@@ -47,6 +47,7 @@ from mjwrap.kernels.wraps.initial_guess import (
 )
 from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side, wrap_on_side
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, INSIDE, set_free
+from mjwrap.kernels.wraps.sides import middle_of_contact, on_allowed_half, point_of_side
 
 SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
@@ -119,8 +120,9 @@ def wrap_by_search(k, ends, node, search):
     straight = segment_winding_angle(k, node, ax, ay, az, bx, by, bz) if winds else 0.0
     # hooked: the straight segment is clear of the surface, but on another branch than the string
     hooked = branch and abs(straight - unwrap_angle(straight, before)) > SAME_BRANCH
-    hinted = mode == COLD and node[k, HINT] > 0.0
     clear = low >= -CLEAR_DEPTH * node[k, SIZE]
+    held = sided(k, node) and not winds
+    hinted = node[k, HINT] > 0.0 and (mode == COLD or (held and not clear))
     side = asked_side(k, node, az, bz) if hinted and winds else NO_SIDE
     if side != NO_SIDE:
         done = clear and is_on_side(k, node, side, straight, ax, ay, az, bx, by, bz)
@@ -140,7 +142,7 @@ def wrap_by_search(k, ends, node, search):
             hinted
             and not hollow(k, node)
             and not one_sided(k, node)
-            and hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
+            and _straight_is_refused(k, node, held, share, ax, ay, az, dx, dy, dz)
             and _search(
                 k, ends, node, ax, ay, az, dx, dy, dz, size, share, True, True, branch, before, False,
                 high_a, high_b, NEAR_HINT,
@@ -177,6 +179,18 @@ def _is_towards(k, node, fx, fy, fz, wx, wy, wz):
 
 
 @jit
+def _is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz):
+    """Return whether the contact of the last evaluation lies where row k's hint asks.
+
+    held: on the half that a side allows at every pose, else in the direction w from the point F, in S.
+    """
+    if held:
+        x, y, z = middle_of_contact(k, ends, node)
+        return on_allowed_half(k, node, x, y, z)
+    return hollow(k, node) or _is_towards(k, node, fx, fy, fz, wx, wy, wz)
+
+
+@jit
 def hint_outside(k, node):
     """Return row k's hint, or the surface point nearest to it where it lies inside the surface."""
     x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
@@ -198,6 +212,17 @@ def hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
         return False
     _, _, _, nx, ny, nz = project(node, k, x, y, z)
     return nx * (x - fx) + ny * (y - fy) + nz * (z - fz) > 0.0
+
+
+@jit
+def _straight_is_refused(k, node, held, share, ax, ay, az, dx, dy, dz):
+    """Return whether the straight segment A + d, which is clear, passes row k's surface where its hint does not ask.
+
+    held: the hint is a side that holds at every pose. share: of the segment's lowest point.
+    """
+    if held:
+        return not on_allowed_half(k, node, ax + share * dx, ay + share * dy, az + share * dz)
+    return hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
 
 
 @jit
@@ -224,13 +249,16 @@ def _search(
 ):
     """Try half planes around AB, the most likely first; write the best path, or the first guess if none is found.
 
-    most: number of half planes to try. Returns whether a path was found, with a hint one on its side.
+    most: number of half planes to try. Returns whether a path was found, with a hint one on its side. With a side that
+    holds at every pose the shortest path on its half is the best, else the first one on the side of the hint.
     """
     # u along AB; w perpendicular to it, from AB's lowest point towards the hint or along the normal; v = u x w
     ux, uy, uz = dx / size, dy / size, dz / size
     fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
+    winds = branched(k, node) and node[k, lay.TOUCH] == 0.0
+    held = hinted and sided(k, node) and not winds
     if hinted:
-        wx, wy, wz = hint_outside(k, node)
+        wx, wy, wz = point_of_side(k, node) if held else hint_outside(k, node)
         wx, wy, wz = wx - fx, wy - fy, wz - fz
     else:
         _, _, _, wx, wy, wz = project(node, k, fx, fy, fz)
@@ -242,13 +270,12 @@ def _search(
     else:
         wx, wy, wz = wx / length, wy / length, wz / length
     vx, vy, vz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    winds = branched(k, node) and node[k, lay.TOUCH] == 0.0
     # beyond the hint: how far from AB, which is clear of the surface, a section is looked for
     above = 0.0
     if most < DIRECTIONS:
         above = length + node[k, SIZE]
     found, best, fresh = False, 0.0, -1
-    guessed, sided = False, False
+    guessed, sided_path = False, False
     j = 0
     # the best solution so far, then the first guess
     memory = carray(stack(), (80,))
@@ -276,32 +303,37 @@ def _search(
         if not good or not _on_branch(k, node, branch, before):
             continue
         # one on the hint's side is better than one that is not, then the shorter one
-        there = not hinted or hollow(k, node) or _is_towards(k, node, fx, fy, fz, wx, wy, wz)
-        if found and (sided or not there) and ((sided and not there) or total >= best * (1.0 - 1e-12)):
+        there = not hinted or _is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz)
+        if (
+            found
+            and (sided_path or not there)
+            and ((sided_path and not there) or total >= best * (1.0 - 1e-12))
+        ):
             continue
-        found, best, fresh, sided = True, total, j, there
+        found, best, fresh, sided_path = True, total, j, there
         node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
         for i in range(lay.STATE):
             memory[i] = node[k, S_MODE + i]
         # the first is nearest to the hint, or to the side that was lost; without either take the shortest
-        if (hinted and there) or not cold:
+        if ((hinted and there) or not cold) and not held:
             break
     # from low ends: all geodesics whose tangents lead to the other end
-    if not found or (cold and not hinted):
+    if not found or held or (cold and not hinted):
         ways = carray(stack(), (80,))
         for side in range(2):
             if (high_a if side == 0 else high_b) > low_end_height(k, node):
                 continue
             for i in range(shoot_geodesics(k, ends, node, side, ways)):
                 good, total = polish_shot(k, ends, node, side, high_a, high_b, ways[2 * i], ways[2 * i + 1])
-                if (
-                    not good
-                    or not _on_branch(k, node, branch, before)
-                    or (found and total >= best * (1.0 - 1e-12))
+                if not good or not _on_branch(k, node, branch, before):
+                    continue
+                there = held and _is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz)
+                if found and (
+                    (sided_path and not there) or (sided_path == there and total >= best * (1.0 - 1e-12))
                 ):
                     continue
                 j += 1
-                found, best, fresh = True, total, j
+                found, best, fresh, sided_path = True, total, j, there
                 node[k, S_SWEEP] = winding_angle(k, node) if winds else 0.0
                 for c in range(lay.STATE):
                     memory[c] = node[k, S_MODE + c]
@@ -316,7 +348,7 @@ def _search(
     node[k, S_MODE] = TOUCHED
     # if the best one was the last that was tried, the row still holds its evaluation
     if found and fresh == j:
-        return sided or not hinted
+        return sided_path or not hinted
     node[k, lay.W_WRAP_ERROR] = -1.0
     if found or guessed:
         start = 0 if found else lay.STATE
@@ -325,4 +357,4 @@ def _search(
     else:
         place_contact(k, node, fx, fy, fz, ux, uy, uz, 0.0)
     geodesic(k, node, ends[0], ends[1], ends[2])
-    return found and (sided or not hinted)
+    return found and (sided_path or not hinted)

@@ -18,7 +18,7 @@ from mjwrap.kernels.compilation.jit import deferred, jit, no_inline
 from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.kernels.geometry.geodesics import geodesic
 from mjwrap.kernels.geometry.projection import into_frame, turn_into_frame
-from mjwrap.kernels.geometry.traits import closed_form
+from mjwrap.kernels.geometry.traits import closed_form, sided
 from mjwrap.kernels.geometry.winding import tangents_sweep, unwrap_angle
 from mjwrap.kernels.wraps.ruled import (
     A_INSIDE,
@@ -35,6 +35,7 @@ from mjwrap.kernels.wraps.ruled import (
     wrap_elliptic_cylinder,
 )
 from mjwrap.kernels.wraps.search import wrap_by_search
+from mjwrap.kernels.wraps.sides import side_sweep
 
 KIND, DIM, SIZE, POS, HINT = lay.KIND, lay.DIM, lay.SIZE, lay.POS, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T, S_ARC = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T, lay.S_ARC
@@ -161,6 +162,8 @@ def sweep_asked_for(k, node, ax, ay, az, bx, by, bz):
         radius_a, radius_b = node[k, DIM] + slope * az, node[k, DIM] + slope * bz
         radius = max(radius_a, radius_b)
     px, py, qx, qy = ax / a, ay / b, bx / a, by / b
+    if sided(k, node):
+        return side_sweep(k, node, px, py, qx, qy, a, b)
     root_a = math.sqrt(max(px * px + py * py - radius_a * radius_a, 0.0))
     root_b = math.sqrt(max(qx * qx + qy * qy - radius_b * radius_b, 0.0))
     principal = math.atan2(px * qy - py * qx, px * qx + py * qy)

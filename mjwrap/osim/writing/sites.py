@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,16 +10,14 @@ from mjwrap.osim.description.functions import Piecewise
 from mjwrap.osim.description.paths import Condition, MovingLocation, PathPoint
 from mjwrap.osim.report import APPROXIMATED, EXACT, Report
 from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.drivers import Drivers
 from mjwrap.osim.writing.piece_algebra import composed, flattened, preimage, weighted_sum
 from mjwrap.osim.writing.unique_names import UniqueNames, plain_name
 
 MOST_NUMBERS = 500  # that a numeric can hold in MuJoCo 3
 NEGLIGIBLE = 1e-12  # [m, 1] rotations of frames are rounded
 
-# The joint whose qpos gives a coordinate, and the coordinate as a function of it (None: it is that qpos);
-# None where no joint gives it.
-Driver = tuple[str, Piecewise | None]
-Drivers = Callable[[str], Driver | None]
+Driver = tuple[str, Piecewise | None]  # see `Drivers.driver`
 Elements = list[dict[str, object]]
 
 
@@ -34,19 +31,18 @@ class Stop:
 
 
 class SiteWriter:
-    """Writes path points as sites; `defaults` are the default values of all coordinates."""
+    """Writes path points as sites."""
 
-    def __init__(
-        self, document: Document, report: Report, drivers: Drivers, defaults: dict[str, float]
-    ) -> None:
-        self._document, self._report, self._drivers, self._defaults = document, report, drivers, defaults
+    def __init__(self, document: Document, report: Report, drivers: Drivers) -> None:
+        self._document, self._report, self._drivers = document, report, drivers.driver
+        self._defaults = drivers.values
         self._sites = UniqueNames(document, "site")
         self._numerics = UniqueNames(document, "numeric", section="custom")
 
-    def site(self, body: str, name: str, position: np.ndarray) -> str:
+    def site(self, body: str, name: str, position: np.ndarray, group: int | None = None) -> str:
         """Write a site on an OpenSim body, at a position (3,) in its frame; return its name."""
         unique = self._sites.new(name)
-        self._document.add(self._document.bodies[body], "site", name=unique, pos=position)
+        self._document.add(self._document.bodies[body], "site", name=unique, pos=position, group=group)
         return unique
 
     def stop(self, owner: str, point: PathPoint) -> Stop:

@@ -8,6 +8,7 @@ from mjwrap.osim.description.paths import WrapObject
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.rotations import quaternion
+from mjwrap.osim.writing.sites import SiteWriter
 from mjwrap.osim.writing.unique_names import UniqueNames
 from mjwrap.surfaces import Cylinder, Ellipsoid, Sphere, Surface, Torus
 
@@ -63,7 +64,7 @@ def side_point(wrap: WrapObject) -> np.ndarray | None:
 
 
 def write_wrap(
-    document: Document, report: Report, wrap: WrapObject, geoms: UniqueNames, sites: UniqueNames
+    document: Document, report: Report, wrap: WrapObject, geoms: UniqueNames, sites: SiteWriter
 ) -> WrittenWrap | None:
     """Write a wrap object's geom, and the site of its side; None for one that is left out."""
     surface = surface_of(wrap)
@@ -92,8 +93,7 @@ def write_wrap(
     side, point = None, side_point(wrap)
     outcome, text = EXACT, f"geom '{geom}'"
     if point is not None and wrap.kind in ("WrapCylinder", "WrapEllipsoid") and not along_axis(wrap):
-        side = sites.new(f"{wrap.name}_side")
-        document.add(parent, "site", name=side, pos=frame.position + frame.rotation @ point, group=HIDDEN)
+        side = sites.site(frame.body, f"{wrap.name}_side", frame.position + frame.rotation @ point, HIDDEN)
         text += f", the path passes on its side {wrap.quadrant.strip()}"
     elif point is not None:
         outcome = APPROXIMATED

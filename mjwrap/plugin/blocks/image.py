@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.kernels import layout
-from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.kernels.coupling import muscle_paths, path_points
 from mjwrap.kernels.musculotendon import mujoco_muscle
 from mjwrap.kernels.musculotendon.dispatch import MUJOCO
 from mjwrap.kernels.solved import segments
@@ -18,6 +18,8 @@ from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.blocks.model_changes import Watch, watch
+from mjwrap.plugin.blocks.points_part import points_part
+from mjwrap.plugin.blocks.pieces_part import pieces_part
 from mjwrap.plugin.blocks.published_part import published_part
 from mjwrap.plugin.blocks.transmission_part import transmission_part
 from mjwrap.plugin.callbacks import block as bk
@@ -39,6 +41,11 @@ def loaded_bodies(plan: Plan) -> NDArray[np.int64]:
     ]
     ends = routes[:, [muscle_paths.R_FROM_BODY, muscle_paths.R_TO_BODY]].ravel()
     return np.unique(np.concatenate([*stops, ends]))
+
+
+def pulled_bodies(model: mujoco.MjModel, plan: Plan) -> NDArray[np.int64]:
+    """Return the ids of the bodies that the muscles of a plan can move: also those whose joints move path points."""
+    return np.union1d(loaded_bodies(plan), model.dof_bodyid[plan.uses[:, path_points.U_DOF]]).astype(np.int64)
 
 
 def state_size(plan: Plan) -> int:
@@ -82,6 +89,8 @@ def _arrays(
         "clock": np.zeros(bk.CLOCK),
         "transmission": transmission_part(model, plan, muscles),
         "published": published_part(model, plan, muscles, left_out),
+        "points": points_part(model, plan.points),
+        "pieces": pieces_part(model),
         "tendon": np.array([m.tendon for m in muscles], dtype=np.int64),
         "actuator": np.array([m.actuator for m in muscles], dtype=np.int64),
         "labels": np.array([m.name.encode()[: dr.LABEL - 1] for m in muscles], dtype=f"S{dr.LABEL}"),
@@ -143,7 +152,7 @@ def block_image(
 _CONSTANT = (
     "routes", "links", "law", "source", "index", "control", "form", "group", "body_rootid", "loaded",
     "weights", "params", "ctrl_low", "ctrl_high", "times", "node", "bound", "drives", "transmission",
-    "published", "tendon", "actuator", "labels",
+    "published", "points", "pieces", "tendon", "actuator", "labels",
 )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ _STRUCTURE = (
     "wrap_objid", "wrap_prm", "actuator_trntype", "actuator_trnid", "actuator_gaintype", "actuator_biastype",
     "actuator_dyntype", "actuator_actadr", "actuator_actnum", "actuator_ctrllimited", "actuator_forcelimited",
     "actuator_group", "numeric_adr", "numeric_size", "tuple_adr", "tuple_size", "tuple_objtype", "tuple_objid",
-    "tuple_objprm",
+    "tuple_objprm", "eq_type", "eq_obj1id", "eq_obj2id",
 )  # fmt: skip
 
 

@@ -37,8 +37,10 @@ ARRAYS = (
     "node", "seg", "count", "info", "own", "excitation", "drive", "start_activation", "start_fiber", "start_length",
     "activation", "fiber", "length", "velocity", "tension", "next_activation", "next_fiber", "status",
     "wrench", "others", "mine", "total", "off", "written", "clock", "failures", "lost", "transmission", "published",
+    "points",
     "tendon", "actuator", "labels", "blank",
     "plain", "plain_seen", "derived", "derived_seen", "structure", "structure_seen", "bound", "drives", "pointers",
+    "pieces",
 )  # fmt: skip
 (
     A_ROUTES, A_LINKS, A_LAW, A_SOURCE, A_INDEX, A_CONTROL, A_FORM, A_GROUP, A_BODY_ROOTID, A_LOADED,
@@ -46,8 +48,10 @@ ARRAYS = (
     A_NODE, A_SEG, A_COUNT, A_INFO, A_OWN, A_EXCITATION, A_DRIVE, A_START_ACTIVATION, A_START_FIBER, A_START_LENGTH,
     A_ACTIVATION, A_FIBER, A_LENGTH, A_VELOCITY, A_TENSION, A_NEXT_ACTIVATION, A_NEXT_FIBER, A_STATUS,
     A_WRENCH, A_OTHERS, A_MINE, A_TOTAL, A_OFF, A_WRITTEN, A_CLOCK, A_FAILURES, A_LOST, A_TRANSMISSION, A_PUBLISHED,
+    A_POINTS,
     A_TENDON, A_ACTUATOR, A_LABELS, A_BLANK,
     A_PLAIN, A_PLAIN_SEEN, A_DERIVED, A_DERIVED_SEEN, A_STRUCTURE, A_STRUCTURE_SEEN, A_BOUND, A_DRIVES, A_POINTERS,
+    A_PIECES,
 ) = range(48, 48 + len(ARRAYS))  # fmt: skip
 # for drawing: byte offsets in MuJoCo's structs (for an option: of its byte), the size of an mjvGeom, MuJoCo's codes,
 # the addresses of a function that warns and of its message

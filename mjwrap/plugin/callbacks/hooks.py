@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from numba.core import types
 
 from mjwrap.kernels.array_types import compiled_types
-from mjwrap.kernels.coupling.evaluation import evaluate
-from mjwrap.kernels.coupling.groups import Paths, Poses, Routes
+from mjwrap.kernels.coupling.evaluation import evaluate, evaluate_with_points
+from mjwrap.kernels.coupling.groups import PathPoints, Paths, Poses, Routes, SiteFrames
 from mjwrap.kernels.musculotendon.groups import Inputs, Muscles, MuscleStates, StepStart, Timing
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks import drawing
@@ -46,17 +46,18 @@ class Entries(NamedTuple):
     draw: Any
 
 
+def _group(kind: Any) -> Any:
+    """Return the type of a group."""
+    return types.BaseTuple.from_types(
+        compiled_types(kind), kind
+    )  # a tuple whose fields all have one type is a different numba type
+
+
 def _evaluation() -> tuple[Any, ...]:
     """Return the types of the arguments with which `stage` calls `evaluate`."""
-
-    def group(kind: Any) -> Any:
-        return types.BaseTuple.from_types(
-            compiled_types(kind), kind
-        )  # a tuple whose fields all have one type is a different numba type
-
     return (
-        group(Routes), group(Muscles), group(Poses), group(Inputs), group(Timing), types.float64,
-        group(Paths), group(StepStart), group(MuscleStates), types.float64[:, ::1],
+        _group(Routes), _group(Muscles), _group(Poses), _group(Inputs), _group(Timing), types.float64,
+        _group(Paths), _group(StepStart), _group(MuscleStates), types.float64[:, ::1],
     )  # fmt: skip
 
 
@@ -67,8 +68,11 @@ def compile_entries() -> Entries:
     from its cache without them.
     """
     signature = types.void(_WORD, _WORD, _WORD)
-    evaluate.compile(_evaluation())
-    evaluate.get_overload(_evaluation())
+    with_points = *_evaluation(), _group(PathPoints), _group(SiteFrames)
+    for function, given in ((evaluate, _evaluation()), (evaluate_with_points, with_points)):
+        kernel: Any = function
+        kernel.compile(given)
+        kernel.get_overload(given)
     draw = callback(types.void(_WORD, _WORD, _WORD, _WORD), drawing.draw)
     return Entries(
         callback(signature, st.stage),

@@ -72,6 +72,12 @@ def call(typing_context: Any, function: Any, first: Any, second: Any, third: Any
 
 
 @intrinsic
+def call_with_two(typing_context: Any, function: Any, first: Any, second: Any) -> Any:
+    """Call void f(int64, int64) by its address."""
+    return _calling(2)
+
+
+@intrinsic
 def call_with_four(
     typing_context: Any, function: Any, first: Any, second: Any, third: Any, fourth: Any
 ) -> Any:

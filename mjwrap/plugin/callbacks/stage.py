@@ -7,7 +7,8 @@ a second time.
 from __future__ import annotations
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.coupling.evaluation import evaluate
+from mjwrap.kernels.coupling.evaluation import evaluate, evaluate_with_points
+from mjwrap.kernels.coupling.path_points import place_sites, write_point_forces
 from mjwrap.kernels.coupling.wrenches import add_to_xfrc, body_wrenches, remove_from_xfrc
 from mjwrap.kernels.musculotendon.dynamics import write_states
 from mjwrap.kernels.musculotendon.groups import Timing
@@ -23,6 +24,8 @@ from mjwrap.plugin.callbacks.groups import (
     states_of,
 )
 from mjwrap.plugin.callbacks.memory import bool_array, float64_array, read_float64, read_int32, read_int64
+from mjwrap.plugin.callbacks.path_points import GIVEN, add_joint_forces, frames_of, points_of
+from mjwrap.plugin.callbacks.pieces import update_pieces
 from mjwrap.plugin.callbacks.publishing import COUNT, publish_lengths
 from mjwrap.plugin.callbacks.saving import floats, ints, load, load_held, save, sizes, state_of
 from mjwrap.plugin.callbacks.sync import sync_with_model
@@ -109,7 +112,10 @@ def _time_since_start(time, step, ended, clock):
 
 
 def stage(block, model, data):
-    """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions."""
+    """Evaluate the instance's muscles at the poses and velocities in mjData, and apply wrenches or transmissions.
+
+    The pieces of couplings of joints are switched, too.
+    """
     state = state_of(block, data)
     _remove_wrenches(block, data, state)
     clock = floats(block, bk.A_CLOCK, (bk.CLOCK,))
@@ -119,7 +125,14 @@ def stage(block, model, data):
         read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS)) & read_int64(block + 8 * bk.NO_ACTUATION)
         != 0
     )
+    at_points = block + read_int64(block + 8 * bk.A_POINTS)
+    has_points = read_int64(at_points + 8 * GIVEN) != 0
+    points, frames = points_of(at_points, block), frames_of(at_points, block, model, data)
+    pieces = block + read_int64(block + 8 * bk.A_PIECES)
     if idle and not transmits:
+        update_pieces(pieces, model, data)
+        if has_points:
+            place_sites(points, frames, poses_of(block, data).site_xpos)
         clock[bk.ACTED] = 0.0
         _erase_paths(block)
         return
@@ -132,6 +145,7 @@ def stage(block, model, data):
     if since == 0.0:
         sync_with_model(block, model)
         load(block, state)
+    update_pieces(pieces, model, data)
     off, group = bool_array(block + read_int64(block + 8 * bk.A_OFF), (n,)), ints(block, bk.A_GROUP, (n,))
     switched = read_int32(model + read_int64(block + 8 * bk.DISABLEACTUATOR))
     for m in range(n):
@@ -140,19 +154,26 @@ def stage(block, model, data):
     wrench = floats(block, bk.A_WRENCH, (bodies, 6))
     routes, poses, paths, states = routes_of(block), poses_of(block, data), paths_of(block), states_of(block)
     timing = Timing(since, ahead, step)
-    failed = evaluate(
-        routes, muscles_of(block), poses, inputs_of(block, data), timing, TOLERANCE, paths, start_of(block), states,
-        wrench,
-    )  # fmt: skip
+    muscles, inputs, start = muscles_of(block), inputs_of(block, data), start_of(block)
+    if has_points:
+        failed = evaluate_with_points(
+            routes, muscles, poses, inputs, timing, TOLERANCE, paths, start, states, wrench, points, frames
+        )
+    else:
+        failed = evaluate(routes, muscles, poses, inputs, timing, TOLERANCE, paths, start, states, wrench)
     if failed and since == 0.0:
         load_held(block, state)
         body_wrenches(routes, poses, paths, states.tension, wrench)
+        if has_points:
+            write_point_forces(points, routes, paths, states.tension)
+    if has_points:
+        add_joint_forces(at_points, data, points)
     lost = bool_array(block + read_int64(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
         lost[m] = states.status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _add_wrenches(block, data, state, wrench)
     if transmits:
-        transmit(part, block, model, data, since == 0.0, routes, poses, paths, states)
+        transmit(part, block, model, data, since == 0.0, routes, poses, paths, points, states)
     shown = block + read_int64(block + 8 * bk.A_PUBLISHED)
     if read_int64(shown + 8 * COUNT) != 0:
         publish_lengths(shown, block, model, data, since == 0.0, states.length, states.velocity)

@@ -41,7 +41,7 @@ def _indices(part, which, owner, shape):
 
 
 @jit
-def transmit(part, block, model, data, first_stage, routes, poses, paths, states):
+def transmit(part, block, model, data, first_stage, routes, poses, paths, points, states):
     """Write length, velocity and moment of the actuators; first_stage: also the sensors of the position stage."""
     n, dofs, outputs = states.length.shape[0], read_int64(part + 8 * DOFS), read_int64(part + 8 * OUTPUTS)
     entries, tendons = read_int64(part + 8 * MOMENTS), read_int64(part + 8 * TENDONS)
@@ -69,7 +69,9 @@ def transmit(part, block, model, data, first_stage, routes, poses, paths, states
         field(part, TEN_J, data, (read_int64(part + 8 * TENDON_MOMENTS),)),
     )
     row = floats(part, A_ROW, (dofs,))
-    write_transmissions(routes, paths, tree, states.length, states.velocity, targets, row)
+    write_transmissions(
+        routes, paths, tree, points.uses, points.slopes, states.length, states.velocity, targets, row
+    )
     flags = read_int32(model + read_int64(block + 8 * bk.DISABLEFLAGS))
     if not first_stage or flags & read_int64(part + 8 * NO_SENSORS):
         return

@@ -62,6 +62,8 @@ def library() -> Any:
     loaded.mj_sizeModel.restype = ctypes.c_int64
     loaded.mj_saveModel.argtypes = [_ADDRESS, ctypes.c_char_p, _ADDRESS, ctypes.c_int64]
     loaded.mj_saveModel.restype = None
+    for name in ("mj_makeConstraint", "mj_island", "mj_projectConstraint"):  # called by their addresses
+        getattr(loaded, name).argtypes, getattr(loaded, name).restype = [_ADDRESS, _ADDRESS], None
     for name in ("mjv_defaultOption", "mjv_defaultScene", "mjv_defaultCamera", "mjv_freeScene"):
         getattr(loaded, name).argtypes, getattr(loaded, name).restype = [_ADDRESS], None
     loaded.mjv_makeScene.argtypes, loaded.mjv_makeScene.restype = [_ADDRESS, _ADDRESS, ctypes.c_int], None

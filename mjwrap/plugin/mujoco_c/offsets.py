@@ -25,10 +25,11 @@ _TYPES: dict[str, Any] = {
 }  # fmt: skip
 
 # pointers that the plugin follows, each verified; data_plugin_state and data_plugin_data: see `probe.py`
-MODEL_POINTERS = ("actuator_gear",)
+MODEL_POINTERS = ("actuator_gear", "site_pos")
 MODEL_PLUGIN_POINTERS = ("plugin_stateadr",)
 DATA_POINTERS = (
-    "qpos", "qvel", "act", "ctrl", "xfrc_applied", "xipos", "geom_xpos", "geom_xmat", "site_xpos", "subtree_com",
+    "qpos", "qvel", "act", "ctrl", "eq_active", "xfrc_applied", "qfrc_passive", "xpos", "xmat", "xipos", "geom_xpos",
+    "geom_xmat", "site_xpos", "subtree_com",
     "cdof", "cvel", "act_dot", "actuator_length", "actuator_velocity", "actuator_force", "moment_rownnz",
     "moment_rowadr", "moment_colind", "actuator_moment", "ten_length", "ten_velocity", "ten_J", "sensordata",
 )  # fmt: skip
@@ -115,6 +116,8 @@ def _probes() -> Iterator[tuple[mujoco.MjModel, mujoco.MjData]]:
             for k in range(2 * n - i):
                 body.add_site(name=f"s{i}_{k}", pos=[0.1, 0, 0])
             actuator = spec.add_actuator(name=f"a{i}", target=f"j{i}")
+            equality = spec.add_equality(name1=f"j{i}", type=mujoco.mjtEq.mjEQ_JOINT)
+            equality.objtype = mujoco.mjtObj.mjOBJ_JOINT
             actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
             actuator.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
             tendon = spec.add_tendon(name=f"t{i}")

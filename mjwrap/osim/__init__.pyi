@@ -1,0 +1,6 @@
+"""The names of `mjwrap.osim`, each with the module that it comes from."""
+
+from .coordinates import coordinates as coordinates
+from .coordinates import set_coordinates as set_coordinates
+
+__all__: list[str]

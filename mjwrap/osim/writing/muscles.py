@@ -1,0 +1,118 @@
+"""Muscles, ligaments, springs and actuators along paths: tuple, numerics, texts, actuator and tendon of each."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from mjwrap.mjcf.parameters import NUMERICS
+from mjwrap.mjcf.wrapping_geoms import SIZES
+from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathSpring
+from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
+from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.laws import WrittenLaw, law_of
+from mjwrap.osim.writing.piece_algebra import flattened
+from mjwrap.osim.writing.routes import Route, RouteWriter
+from mjwrap.osim.writing.unique_names import UniqueNames
+
+DISABLED = "it applies no force in the file"
+Pull = Muscle | Ligament | PathSpring | PathActuator
+
+
+class MuscleWriter:
+    """Writes all forces along paths into a document; `default_activations` has one number for each state written."""
+
+    def __init__(self, document: Document, report: Report, routes: RouteWriter) -> None:
+        self._document, self._report, self._routes = document, report, routes
+        self._actuators = UniqueNames(
+            document, *(each.tag for each in document.section("actuator")), section="actuator"
+        )
+        self._tendons = UniqueNames(document, "spatial", "fixed", section="tendon")
+        self._tuples = UniqueNames(document, "tuple", section="custom")
+        self._labels = 0
+        self.default_activations: list[float] = []
+
+    def write(self, pull: Pull) -> None:
+        """Write one force along a path, and its entries in the report."""
+        kind = pull.kind if isinstance(pull, Muscle) else type(pull).__name__
+        if not pull.active:
+            self._report.add(kind, pull.name, LEFT_OUT, DISABLED)
+            return
+        fault = _fault(pull)
+        route = None if fault else self._routes.route(pull.name, pull.path)
+        if route is None:
+            self._report.add(kind, pull.name, LEFT_OUT, fault or "its path is left out")
+            return
+        match pull:
+            case Muscle():
+                law = law_of(pull)
+                self._driven(pull.name, route, law, pull.control_range)
+                if law.own_states:
+                    self.default_activations += [float(pull.parameters.get("default_activation", 0.0)), 0.0]
+            case PathActuator():
+                law = WrittenLaw("path_actuator", {"optimal_force": [pull.optimal_force]}, own_states=False)
+                self._driven(pull.name, route, law, pull.control_range)
+            case Ligament():
+                law = WrittenLaw("ligament", {
+                    "resting_length": [pull.resting_length], "pcsa_force": [pull.pcsa_force],
+                    "ligament_curve": flattened(pull.curve)}, own_states=False)  # fmt: skip
+                self._passive(pull.name, route, law)
+            case PathSpring():
+                law = WrittenLaw("path_spring", {
+                    "resting_length": [pull.resting_length], "stiffness": [pull.stiffness],
+                    "dissipation": [pull.dissipation]}, own_states=False)  # fmt: skip
+                self._passive(pull.name, route, law)
+        outcome = APPROXIMATED if law.remarks else EXACT
+        self._report.add(kind, pull.name, outcome, "; ".join([f"law {law.name}", *law.remarks]))
+
+    def _driven(
+        self, name: str, route: Route, law: WrittenLaw, controls: tuple[float, float]
+    ) -> None:
+        """Write a muscle that an actuator drives, with a tendon over its sites for MuJoCo's sake."""
+        actuator = self._actuators.new(name)
+        tendon = self._tendons.new(f"{actuator}_tendon")
+        line = self._document.add("tendon", "spatial", name=tendon, width=0.001)
+        for site, _ in itertools.groupby(route.sites):
+            self._document.add(line, "site", site=site)
+        limited = all(map(math.isfinite, controls)) and controls[0] < controls[1]
+        states = {"dyntype": "user", "actdim": 2} if law.own_states else {"dyntype": "none"}
+        self._document.add("actuator", "general", name=actuator, tendon=tendon, ctrllimited=limited,
+                           ctrlrange=controls if limited else None, gaintype="fixed", gainprm=0, biastype="none",
+                           **states)  # fmt: skip
+        self._tuple(actuator, route, law, [{"objtype": "actuator", "objname": actuator}])
+
+    def _passive(self, name: str, route: Route, law: WrittenLaw) -> None:
+        """Write a muscle without an actuator."""
+        self._tuple(name, route, law, [])
+
+    def _tuple(self, name: str, route: Route, law: WrittenLaw, first: Sequence[dict[str, object]]) -> None:
+        self._labels += 1
+        title = self._tuples.new(f"mjwrap_{name}")
+        label = f"mjwrap_path{self._labels}" if any(key in name for key in (*NUMERICS, *SIZES)) else title
+        elements = [*first, *route.elements]
+        for key, values in law.numbers.items():
+            self._document.numeric(f"{label}_{key}", values)
+            elements.append({"objtype": "numeric", "objname": f"{label}_{key}"})
+        for key, word in {"law": law.name, **law.words}.items():
+            self._document.add("custom", "text", name=f"{label}_{key}", data=word)
+            elements.append({"objtype": "text", "objname": f"{label}_{key}"})
+        record = self._document.add("custom", "tuple", name=title)
+        for element in elements:
+            self._document.add(record, "element", **element)
+
+
+def _fault(pull: Pull) -> str:
+    """Return why a force along a path cannot be written, or nothing."""
+    if isinstance(pull, Muscle):
+        for key in ("max_isometric_force", "optimal_fiber_length"):
+            value = pull.parameters.get(key, 0.0)
+            if not (math.isfinite(value) and value > 0.0):
+                return f"its {key} is {value:g}"
+    if isinstance(pull, PathSpring) and not pull.stiffness > 0.0:
+        return f"its stiffness is {pull.stiffness:g}"
+    if isinstance(pull, Ligament) and not (pull.pcsa_force > 0.0 and pull.resting_length > 0.0):
+        return f"its pcsa_force is {pull.pcsa_force:g} and its resting_length {pull.resting_length:g}"
+    if isinstance(pull, PathActuator) and not pull.optimal_force > 0.0:
+        return f"its optimal_force is {pull.optimal_force:g}"
+    return ""
