@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 from mjwrap.osim.description.bodies import Mesh
@@ -170,8 +169,8 @@ def write_contacts(
     forces = [force for force in model.forces if isinstance(force, HuntCrossley)]
     if not forces:
         return
-    compiled = mujoco.MjModel.from_xml_string(document.to_xml(), document.assets)
-    names = {body: "world" if body == "ground" else body for body in document.bodies}
+    compiled = document.compile()
+    names = {body: element.get("name", "world") for body, element in document.bodies.items()}
     inverse_mass = {
         body: float(compiled.body_invweight0[compiled.body(name).id, 0]) for body, name in names.items()
     }
