@@ -49,7 +49,7 @@ class Poses:
             return np.array([axis @ offset for axis in self.across(constraint.direction)])
         first, second = self.frame(constraint.first), self.frame(constraint.second)
         if isinstance(constraint, PointConstraint):
-            return first[:3, 3] - second[:3, 3]
+            return np.asarray(first[:3, 3] - second[:3, 3], dtype=np.float64)
         if isinstance(constraint, DistanceConstraint):
             return np.array([np.linalg.norm(first[:3, 3] - second[:3, 3]) - constraint.distance])
         return _difference(first, second)
@@ -59,8 +59,8 @@ class Poses:
         """Return two unit vectors (3,) that are perpendicular to a direction and to each other."""
         unit = direction / np.linalg.norm(direction)
         first = np.cross(unit, np.eye(3)[int(np.argmin(np.abs(unit)))])
-        first /= np.linalg.norm(first)
-        return [first, np.cross(unit, first)]
+        first = np.asarray(first / np.linalg.norm(first), dtype=np.float64)
+        return [first, np.asarray(np.cross(unit, first), dtype=np.float64)]
 
 
 def _difference(first: Array, second: Array) -> Array:
@@ -114,7 +114,8 @@ def assemble(model: OsimModel, branches: list[Branch], drivers: Drivers) -> None
         drivers.settle(start | dict(zip(names, map(float, q), strict=True)))
         return residuals(model, branches, drivers.value)
 
-    best, q = home, home
+    q: Array = home
+    best: Array = home
     smallest = np.inf
     for _ in range(60):
         error = errors(q)
@@ -128,5 +129,5 @@ def assemble(model: OsimModel, branches: list[Branch], drivers: Drivers) -> None
         if size < EXACT and float(np.abs(step).max()) < SETTLED:
             break
         largest = float(np.abs(step).max())
-        q = q + step * min(1.0, 1.0 / largest if largest > 0.0 else 1.0)
+        q = np.asarray(q + step * min(1.0, 1.0 / largest if largest > 0.0 else 1.0), dtype=np.float64)
     errors(best)

@@ -105,8 +105,8 @@ class _Inverse:
         for _ in range(5):
             step = step - (polyval(step, self._row) - x) / polyval(step, self._slope)
         if derivative:
-            return polyval(step, self._outer_slope) / polyval(step, self._slope)
-        return polyval(step, self._outer)
+            return np.asarray(polyval(step, self._outer_slope) / polyval(step, self._slope), dtype=np.float64)
+        return np.asarray(polyval(step, self._outer), dtype=np.float64)
 
 
 class _Made:
