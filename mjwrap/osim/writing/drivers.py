@@ -16,7 +16,6 @@ from mjwrap.osim.writing.quartics import TOLERANCE, inverse_pieces
 from mjwrap.osim.writing.tree import Branch, unused
 from mjwrap.osim.writing.unique_names import plain_name
 
-
 MOST_PIECES = 70  # of degree 4 in the 500 numbers of a numeric
 
 
@@ -35,7 +34,8 @@ class Drivers:
     """The joints of coordinates.
 
     couplers: by dependent coordinate, each with its first coupler. carriers: the motion that shows a coordinate, by
-    its name. substitutes: by independent coordinate that no motion shows. values: of all coordinates at the default pose [rad or m].
+    its name. substitutes: by independent coordinate that no motion shows.
+    values: of all coordinates at the default pose [rad or m].
     """
 
     coordinates: dict[str, Coordinate]
@@ -53,7 +53,7 @@ class Drivers:
         return coupler.independent[0], function
 
     def leader(self, name: str) -> tuple[str, Piecewise | None]:
-        """Return the coordinate with a joint that gives a coordinate, and by which function; None where it is the same."""
+        """Return the coordinate with a joint that gives a coordinate, and by which function; None if it is the same."""
         dependence = self.dependence(name)
         if name in self.carriers or dependence is None:
             return name, None
@@ -106,7 +106,7 @@ def drivers_of(model: OsimModel, branches: list[Branch]) -> Drivers:
                 continue
             if step.coordinate not in coordinates:
                 raise OsimError(
-                    f"{branch.joint.kind} '{branch.joint.name}': coordinate '{step.coordinate}' of {step.name} not found; "
+                    f"{branch.joint.kind} '{branch.joint.name}': coordinate '{step.coordinate}' not found; "
                     f"coordinates: {', '.join(coordinates)}"
                 )
             if _shows(step):
@@ -137,7 +137,10 @@ def _substitutes(
         if inverse is not None:
             joint = unused(plain_name(f"{branch.joint.name}_{step.name}"), taken)
             found[name] = Substitute(
-                joint, step, (low - room, high + room), _shortened(step.function, low - room, high + room, inverse)
+                joint,
+                step,
+                (low - room, high + room),
+                _shortened(step.function, low - room, high + room, inverse),
             )
     return found
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mjwrap.osim.description.bodies import Joint
 from mjwrap.osim.description.forces import (
     Bushing,
     CoordinateActuator,
@@ -19,15 +20,20 @@ from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.assembly import Poses
 from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
+from mjwrap.osim.writing.rotations import quaternion
 from mjwrap.osim.writing.skeleton import Skeleton
 from mjwrap.osim.writing.unique_names import UniqueNames
 
 UNLIMITED = 1e10
+TURNING_FREELY = ("FreeJoint", "BallJoint", "EllipsoidJoint")
+TORQUE = (
+    "; OpenSim turns it into a torque about an axis of the parent frame, here it acts on the angle itself"
+)
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a force on a coordinate acts: joint, and slope of the coordinate by the joint's qpos, and its value at zero."""
+    """Where a force on a coordinate acts: joint, slope of the coordinate by the joint's qpos, and its value at zero."""
 
     joint: str
     slope: float
@@ -39,6 +45,13 @@ class _Writer:
         self.document, self.report, self.skeleton = document, report, skeleton
         self.tendons = UniqueNames(document, "fixed", "spatial", section="tendon")
         self.actuators = UniqueNames(document, "general", "muscle", section="actuator")
+        # Coordinates on which a force acts in OpenSim as a torque about an axis of the joint's parent frame.
+        self.turns: dict[str, tuple[Joint, int]] = {
+            coordinate.name: (branch.joint, axis)
+            for branch in skeleton.branches
+            if branch.joint.kind in TURNING_FREELY
+            for axis, coordinate in enumerate(branch.joint.coordinates[:3])
+        }
 
     def place(self, kind: str, name: str, coordinate: str) -> _Place | None:
         """Return where a force on a coordinate acts; None, with an entry in the report, where it cannot."""
@@ -50,11 +63,15 @@ class _Writer:
         if function is None:
             return _Place(joint, 1.0, 0.0)
         if not function.is_linear:
-            self.report.add(kind, name, LEFT_OUT, f"coordinate '{coordinate}' is a curved function of joint '{joint}'")
+            self.report.add(
+                kind, name, LEFT_OUT, f"coordinate '{coordinate}' is a curved function of joint '{joint}'"
+            )
             return None
         return _Place(joint, float(function(0.0, 1)), float(function(0.0)))
 
-    def spring(self, name: str, place: _Place, rest: tuple[float, float], stiffness: float, damping: float) -> None:
+    def spring(
+        self, name: str, place: _Place, rest: tuple[float, float], stiffness: float, damping: float
+    ) -> None:
         """Write a linear spring and damper on a coordinate, slack between two values of it [rad or m]."""
         ends = sorted((value - place.at_zero) for value in rest)
         tendon = self.document.add("tendon", "fixed", name=self.tendons.new(name), stiffness=stiffness,
@@ -67,8 +84,23 @@ class _Writer:
             return
         low, high = force.control_range
         bounded = np.isfinite([low, high]).all() and low < high
-        self.document.add("actuator", "general", name=self.actuators.new(force.name), joint=place.joint,
-                          gear=force.optimal_force * place.slope, ctrllimited=bounded,
+        about = self.turns.get(force.coordinate)
+        at: dict[str, object]
+        if about is None:
+            at = {"joint": place.joint, "gear": force.optimal_force * place.slope}
+        else:
+            joint, axis = about
+            sites = [
+                UniqueNames(self.document, "site").new(f"{force.name}_{which}")
+                for which in ("child", "parent")
+            ]
+            for site, frame in zip(sites, (joint.child, joint.parent), strict=True):
+                self.document.add(self.document.bodies[frame.body], "site", name=site, pos=frame.position,
+                                  quat=quaternion(frame.rotation), group=4)  # fmt: skip
+            torque = np.zeros(6)
+            torque[3 + axis] = force.optimal_force
+            at = {"site": sites[0], "refsite": sites[1], "gear": torque}
+        self.document.add("actuator", "general", name=self.actuators.new(force.name), **at, ctrllimited=bounded,
                           ctrlrange=(low, high) if bounded else None)  # fmt: skip
         self.report.add("CoordinateActuator", force.name, EXACT)
 
@@ -85,6 +117,7 @@ class _Writer:
         text = "stiff from the limit on, where OpenSim's stiffness rises smoothly over the transition"
         if force.damping > 0.0:
             text += f"; its damping of {force.damping:.4g}, which acts outside the limits only, is left out"
+        text += TORQUE * (force.coordinate in self.turns)
         self.report.add("CoordinateLimitForce", force.name, APPROXIMATED, text,
                         _transition_error(force.transition, stiffness), "N m or N, at most")  # fmt: skip
 
@@ -92,7 +125,9 @@ class _Writer:
         place = self.place("SpringGeneralizedForce", force.name, force.coordinate)
         if place is not None:
             self.spring(force.name, place, (force.rest, force.rest), force.stiffness, force.viscosity)
-            self.report.add("SpringGeneralizedForce", force.name, EXACT, "spring and damper of a fixed tendon")
+            turned = force.coordinate in self.turns
+            self.report.add("SpringGeneralizedForce", force.name, APPROXIMATED if turned else EXACT,
+                            "spring and damper of a fixed tendon" + TORQUE * turned)  # fmt: skip
 
     def bushing(self, force: Bushing) -> None:
         deviations = self._affine(force)
@@ -112,14 +147,18 @@ class _Writer:
                                        springlength=_rest(-offset[k], -offset[k]))  # fmt: skip
             for joint, slope in terms.items():
                 self.document.add(tendon, "joint", joint=joint, coef=slope)
-        self.report.add("BushingForce", force.name, EXACT, "springs and dampers on the coordinates between its frames")
+        self.report.add(
+            "BushingForce", force.name, EXACT, "springs and dampers on the coordinates between its frames"
+        )
 
     def _affine(self, force: Bushing) -> tuple[Array, dict[str, Array]] | None:
         """Return the six deviations at zero and their slopes (6,) by joint, if they are linear in joints' positions.
 
         A deviation is an angle of the second frame in the first, body-fixed x-y-z, or a displacement along its axes.
         """
-        joints = {name: motion for name, motion in self.skeleton.joints if not isinstance(motion, EllipsoidSlide)}
+        joints = {
+            name: motion for name, motion in self.skeleton.joints if not isinstance(motion, EllipsoidSlide)
+        }
         drivers = self.skeleton.drivers
         names = [name for name in joints if drivers.driver(name) == (name, None)]
         others = [motion.coordinate for name, motion in joints.items() if name not in names]
@@ -133,7 +172,9 @@ class _Writer:
         matrix = np.concatenate([np.ones((len(samples), 1)), samples], axis=1)
         found, *_ = np.linalg.lstsq(matrix, np.array(rows), rcond=None)
         curved = float(np.abs(matrix @ found - np.array(rows)).max()) > 1e-9
-        moving = {name: np.where(np.abs(row) > 1e-12, row, 0.0) for name, row in zip(names, found[1:], strict=True)}
+        moving = {
+            name: np.where(np.abs(row) > 1e-12, row, 0.0) for name, row in zip(names, found[1:], strict=True)
+        }
         moving = {name: row for name, row in moving.items() if row.any()}
         if curved or set(moving).intersection(others):
             return None  # an axis that follows one of these coordinates by a function is a joint of its own
@@ -157,7 +198,7 @@ def _rest(low: float, high: float) -> tuple[float, float]:
 
 
 def _transition_error(transition: float, stiffness: float) -> float:
-    """Return the largest difference between a spring and one whose stiffness rises as a smooth step over a transition."""
+    """Return the largest difference between a spring and one whose stiffness rises smoothly over a transition."""
     x: Array = np.linspace(0.0, 1.0, 401)
     smooth = x**3 * (10.0 + x * (6.0 * x - 15.0))
     return float((stiffness * transition * x * (1.0 - smooth)).max())

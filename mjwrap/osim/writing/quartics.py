@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Protocol
 
 import numpy as np
@@ -13,19 +14,22 @@ from mjwrap.osim.writing.piece_algebra import shifted
 DEGREE = 4
 TOLERANCE = 1e-10  # [rad or m] of an approximated piece
 IDENTITY = linear(1.0)
+MOST_PIECES = 400  # of one fit
 
 
-def quartic_pieces(function: Piecewise, low: float, high: float) -> Piecewise:
-    """Return a function with pieces of degree 4 at most, with continuous slope, within 1e-10 from `low` to `high`.
+def quartic_pieces(function: Piecewise, low: float, high: float, tolerance: float = TOLERANCE) -> Piecewise:
+    """Return a function with pieces of degree 4 at most, with continuous slope, close from `low` to `high`.
 
     A piece of degree 4 or less is kept as it is. Others are split until quartics that share values and slopes at both
     ends and the value in the middle are close enough; beyond `low` and `high` their last quartics go on.
     """
     rows = function.coefficients
     if not rows[:, DEGREE + 1 :].any():
-        return Piecewise(function.breaks, function.origins, rows[:, : DEGREE + 1], function.kind, function.error)
+        return Piecewise(
+            function.breaks, function.origins, rows[:, : DEGREE + 1], function.kind, function.error
+        )
     edges = np.concatenate([[-np.inf], function.breaks, [np.inf]])
-    made = _Made()
+    made = _Made(tolerance)
     for piece in range(len(rows)):
         left, right = float(edges[piece]), float(edges[piece + 1])
         if rows[piece, DEGREE + 1 :].any():
@@ -48,12 +52,13 @@ def inverse_pieces(
 
     With `outer`, another function of the same variable, return outer(inverse).
 
-    Straight lines are inverted exactly, and the rest within the tolerance. Beyond the values at `low` and `high` the last pieces go on.
+    Straight lines are inverted exactly, and the rest within the tolerance. Beyond the
+    values at `low` and `high` the last pieces go on.
     """
     breaks = np.union1d(function.breaks, outer.breaks)
     breaks = breaks[(breaks > low) & (breaks < high)]
     knots = np.concatenate([[low], breaks, [high]])
-    slopes = function(np.concatenate([np.linspace(a, b, 50) for a, b in zip(knots[:-1], knots[1:], strict=True)]), 1)
+    slopes = function(np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(knots)]), 1)
     if slopes.max() * slopes.min() <= 0.0 or np.abs(slopes).min() < 1e-3 * np.abs(slopes).max():
         return None
     if slopes[0] < 0.0:
@@ -68,7 +73,9 @@ def inverse_pieces(
         start, stop = float(function(knots[k])), float(function(knots[k + 1]))
         left = start if k else -np.inf
         if row[2:].any() or wide[DEGREE + 1 :].any():
-            made.fit(_Inverse(row, wide, float(knots[k]) - origin, float(knots[k + 1]) - origin), left, start, stop)
+            made.fit(
+                _Inverse(row, wide, float(knots[k]) - origin, float(knots[k + 1]) - origin), left, start, stop
+            )
         else:
             made.add(left, float(row[0]), wide / row[1] ** np.arange(len(wide)))
     return made.function(function.kind, 0.0)
@@ -98,14 +105,14 @@ class _Inverse:
         for _ in range(5):
             step = step - (polyval(step, self._row) - x) / polyval(step, self._slope)
         if derivative:
-            return polyval(step, self._outer_slope) / polyval(step, self._slope)
-        return polyval(step, self._outer)
+            return np.asarray(polyval(step, self._outer_slope) / polyval(step, self._slope), dtype=np.float64)
+        return np.asarray(polyval(step, self._outer), dtype=np.float64)
 
 
 class _Made:
     """Pieces in the making."""
 
-    def __init__(self, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
         self.breaks: list[float] = []
         self.origins: list[float] = []
@@ -121,11 +128,19 @@ class _Made:
 
     def fit(self, function: Smooth, left: float, start: float, stop: float) -> None:
         """Add quartics that follow a function from `start` to `stop`; the first one holds from `left` on."""
-        ends = _split(function, start, stop, self.tolerance)
-        for k in range(len(ends) - 1):
-            middle, row, error = _quartic(function, ends[k], ends[k + 1])
-            self.add(ends[k] if k else left, middle, row)
-            self.worst = max(self.worst, error)
+        ends = np.array([start, stop])
+        while True:
+            middles, rows, errors = _quartics(function, ends)
+            if errors.max() <= self.tolerance or len(middles) >= MOST_PIECES:
+                break
+            # An error falls with the fifth power of the width.
+            parts = np.clip((errors / self.tolerance) ** 0.2 + 1.0, 1.0, 8.0).astype(int)
+            parts[errors <= self.tolerance] = 1
+            cut = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends[:-1], ends[1:], parts, strict=True)]
+            ends = np.concatenate([*cut, ends[-1:]])
+        for k in range(len(middles)):
+            self.add(float(ends[k]) if k else left, float(middles[k]), rows[k])
+        self.worst = max(self.worst, float(errors.max()))
 
     def function(self, kind: str, error: float) -> Piecewise:
         """Return the function that the pieces make."""
@@ -135,25 +150,20 @@ class _Made:
         return Piecewise(np.array(self.breaks), np.array(self.origins), padded, kind, max(error, self.worst))
 
 
-def _split(function: Smooth, start: float, stop: float, tolerance: float) -> list[float]:
-    """Return ends of intervals on which quartics are close enough."""
-    if _quartic(function, start, stop)[2] <= tolerance or stop - start < 1e-4:
-        return [start, stop]
-    middle = 0.5 * (start + stop)
-    return _split(function, start, middle, tolerance)[:-1] + _split(function, middle, stop, tolerance)
-
-
-def _quartic(function: Smooth, start: float, stop: float) -> tuple[float, Array, float]:
-    """Return the middle of an interval, the quartic about it (5,), and its largest difference from a function."""
-    middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
-    ends = np.array([start, stop])
-    values, slopes = function(ends), function(ends, 1)
-    at_middle = float(function(np.array([middle]))[0])
-    even = 0.5 * (values[0] + values[1]) - at_middle
-    odd = 0.5 * (values[1] - values[0])
-    fourth = 0.25 * half * (slopes[1] - slopes[0]) - even
-    third = 0.5 * (0.5 * half * (slopes[0] + slopes[1]) - odd)
-    row = np.array([at_middle, (odd - third) / half, (even - fourth) / half**2, third / half**3, fourth / half**4])
-    x = middle + half * np.cos(np.linspace(0.0, np.pi, 21))
-    difference = polyval(x - middle, row) - function(x)
-    return middle, row, float(np.abs(difference).max())
+def _quartics(function: Smooth, ends: Array) -> tuple[Array, Array, Array]:
+    """Return middles (n,) of intervals between ends (n + 1,), quartics about them (n, 5), and their errors (n,)."""
+    middles, half = 0.5 * (ends[:-1] + ends[1:]), 0.5 * np.diff(ends)
+    values, slopes, at_middle = function(ends), function(ends, 1), function(middles)
+    even = 0.5 * (values[:-1] + values[1:]) - at_middle
+    odd = 0.5 * np.diff(values)
+    fourth = 0.25 * half * np.diff(slopes) - even
+    third = 0.5 * (0.5 * half * (slopes[:-1] + slopes[1:]) - odd)
+    rows = np.stack(
+        [at_middle, (odd - third) / half, (even - fourth) / half**2, third / half**3, fourth / half**4], 1
+    )
+    steps = half[:, None] * np.cos(np.linspace(0.0, np.pi, 15))
+    wanted = function((middles[:, None] + steps).ravel()).reshape(steps.shape)
+    found = np.zeros_like(steps)
+    for k in range(DEGREE, -1, -1):
+        found = found * steps + rows[:, k : k + 1]
+    return middles, rows, np.abs(found - wanted).max(axis=1)
