@@ -84,7 +84,9 @@ class World:
         return pose.position + pose.rotation @ local, pose.rotation @ turn.reshape(3, 3)
 
 
-def solved(world: World, bodies: dict, muscle: MuscleDeclaration) -> tuple[mw.PathSolution, list[tuple[str, object]]]:
+def solved(
+    world: World, bodies: dict, muscle: MuscleDeclaration
+) -> tuple[mw.PathSolution, list[tuple[str, object]]]:
     """Return mjwrap's path, and what it touches for OpenSim."""
     route = muscle.routes[0]
     first, last = (world.place(bodies, "site", site)[0] for site in (route.origin, route.insertion))
@@ -150,16 +152,24 @@ def compare(file: Path, count: int) -> None:
                     close += 1
                 else:
                     rest.append((length - solution.length, muscle.name, "Scholz"))
-    print(f"{file.stem}: {len(muscles)} paths over surfaces, {pairs} pairs of path and pose, {unsolved} not converged")
-    print(f"  touching {touching}, within {CLOSE:g} m of Scholz2015GeometryPath {close} ({close / max(touching, 1):.1%})")
-    print(f"  within 1 mm of the classic path {within / max(pairs - unsolved, 1):.1%}, worst {max(compared, default=0)}")
+    print(
+        f"{file.stem}: {len(muscles)} paths over surfaces, {pairs} pairs of path and pose, {unsolved} not converged"
+    )
+    print(
+        f"  touching {touching}, within {CLOSE:g} m of Scholz2015GeometryPath {close} ({close / max(touching, 1):.1%})"
+    )
+    print(
+        f"  within 1 mm of the classic path {within / max(pairs - unsolved, 1):.1%}, worst {max(compared, default=0)}"
+    )
     for entry in rest[:20]:
         print("   ", *entry)
 
 
 def main() -> None:
     """Compare every model given."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("models", nargs="+", type=Path)
     parser.add_argument("--poses", type=int, default=30)
     options = parser.parse_args()

@@ -74,7 +74,9 @@ def frozen(file: Path, poses: int, seed: int) -> dict:
 
 def main() -> None:
     """Write one file for every model."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("models", type=Path, help="folder of .osim files")
     parser.add_argument("out", type=Path, help="folder to write to")
     parser.add_argument("--poses", type=int, default=8, help="poses a model (default: 8)")
@@ -83,7 +85,9 @@ def main() -> None:
     opensim.Logger.setLevelString("Error")
     for name in MODELS:
         record = frozen(options.models / f"{name}.osim", options.poses, seed=1)
-        (options.out / f"lengths_{name}.json").write_text(json.dumps(record, indent=0) + "\n", encoding="utf-8")
+        (options.out / f"lengths_{name}.json").write_text(
+            json.dumps(record, indent=0) + "\n", encoding="utf-8"
+        )
         print(f"{name}: {len(record['paths'])} paths, {sum(map(bool, record['wrapped']))} with wraps")
 
 

@@ -51,7 +51,9 @@ class RouteWriter:
         kept: list[Seat] = []
         for wrap in path.wraps:
             if wrap.object not in self._wraps:
-                self._report.add("PathWrap", f"{owner}/{wrap.object}", LEFT_OUT, "its wrap object is left out")
+                self._report.add(
+                    "PathWrap", f"{owner}/{wrap.object}", LEFT_OUT, "its wrap object is left out"
+                )
         for seat in seat_wraps(path, self._wraps, self._poses):
             name = f"{owner}/{seat.wrap}"
             points = path.points

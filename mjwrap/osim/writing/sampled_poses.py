@@ -92,7 +92,9 @@ def _closed(model: OsimModel, values: dict[str, float], movable: list[str]) -> d
         if np.abs(gap).max() < CLOSED:
             return values | dict(zip(movable, map(float, x), strict=True))
         if k % FRESH == 0:
-            slopes = np.array([(gap_at(x + step) - gap) / DIFFERENCE for step in DIFFERENCE * np.eye(len(x))]).T
+            slopes = np.array(
+                [(gap_at(x + step) - gap) / DIFFERENCE for step in DIFFERENCE * np.eye(len(x))]
+            ).T
         step = np.linalg.lstsq(slopes, -gap, rcond=1e-8)[0]
         step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
         x = x + step

@@ -64,9 +64,7 @@ class SiteWriter:
 
     def _moving_site(self, owner: str, name: str, point: PathPoint, moving: MovingLocation) -> str:
         names, functions = moving.coordinates, moving.functions
-        here = np.array(
-            [float(f(self._defaults.get(c, 0.0))) for c, f in zip(names, functions, strict=True)]
-        )
+        here = np.array([float(f(self._defaults.get(c, 0.0))) for c, f in zip(names, functions, strict=True)])
         frame = point.frame
         site = self.site(frame.body, name, frame.position + frame.rotation @ here)
         elements: Elements = []
@@ -116,11 +114,7 @@ class SiteWriter:
     def _condition(self, owner: str, site: str, condition: Condition) -> Elements:
         driver = self._drivers(condition.coordinate)
         low, high = condition.range
-        held = (
-            (low, high)
-            if driver is None or driver[1] is None
-            else preimage(driver[1], low, high)
-        )
+        held = (low, high) if driver is None or driver[1] is None else preimage(driver[1], low, high)
         if driver is None or held is None:
             inside = low <= self._defaults.get(condition.coordinate, 0.0) <= high
             self._report.add("ConditionalPathPoint", site, APPROXIMATED,

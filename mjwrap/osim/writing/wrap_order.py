@@ -33,7 +33,9 @@ def in_order(
         wanted = votes[b.wrap, a.wrap] - votes[a.wrap, b.wrap]
         return wanted or a.along.get(gap, 0.5) - b.along.get(gap, 0.5)
 
-    ordered = sorted(here, key=functools.cmp_to_key(lambda a, b: (compare(a, b) > 0.0) - (compare(a, b) < 0.0)))
+    ordered = sorted(
+        here, key=functools.cmp_to_key(lambda a, b: (compare(a, b) > 0.0) - (compare(a, b) < 0.0))
+    )
     for k, seat in enumerate(ordered):
         wrong = sum(votes[later.wrap, seat.wrap] for later in ordered[k + 1 :])
         seat.turned = max(seat.turned, wrong / max(len(samples), 1))

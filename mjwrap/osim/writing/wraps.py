@@ -97,13 +97,10 @@ def write_wrap(
         text += f", the path passes on its side {wrap.quadrant.strip()}"
     elif point is not None:
         outcome = APPROXIMATED
-        text += (
-            f"; its side {wrap.quadrant.strip()} is not kept: "
-            + {
-                "WrapSphere": "a string slides off a sphere to the short way round",
-                "WrapTorus": "a string on a torus lies where it is pushed",
-            }.get(wrap.kind, "both ways round the axis have it")
-        )
+        text += f"; its side {wrap.quadrant.strip()} is not kept: " + {
+            "WrapSphere": "a string slides off a sphere to the short way round",
+            "WrapTorus": "a string on a torus lies where it is pushed",
+        }.get(wrap.kind, "both ways round the axis have it")
     if wrap.kind == "WrapTorus":
         outcome = APPROXIMATED if outcome is APPROXIMATED else EXACT
         text += ", wrapped as a torus (OpenSim wraps a cylinder in its place)"
