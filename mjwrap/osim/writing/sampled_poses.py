@@ -30,7 +30,7 @@ DIFFERENCE = 1e-6  # [rad or m] of these derivatives
 
 
 def sampled_poses(model: OsimModel, count: int, seed: int = 0) -> list[Sample]:
-    """Return the default pose and random ones, `count` in all; constraints between bodies are met where that is possible.
+    """Return the default pose and random ones, `count` in all; constraints between bodies are met where they can be.
 
     Coordinates without a small range stay within 1.5 rad or 0.3 m of their default values; locked ones keep these.
     """

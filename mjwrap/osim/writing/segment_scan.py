@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -60,7 +61,7 @@ def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, sample: Sample) ->
     }
     return [
         act_between(written, first, last, places[first], places[last])
-        for first, last in zip(there, there[1:], strict=False)
+        for first, last in itertools.pairwise(there)
     ]
 
 

@@ -56,10 +56,8 @@ def _met(
         written = wraps[seat.wrap]
         frame = frame_pose(sample.bodies, written.wrap.frame)
 
-        def inner(point: Array) -> Array:
-            return frame.rotation.T @ (point - frame.position)
-
-        acts = [act_between(written, k, k + 1, inner(a), inner(b)) for k, (a, b) in enumerate(pieces)]
+        ends = [[frame.rotation.T @ (end - frame.position) for end in piece] for piece in pieces]
+        acts = [act_between(written, k, k + 1, a, b) for k, (a, b) in enumerate(ends)]
         best = best_act(acts)
         if best is None or best.contact is None:
             continue
