@@ -12,15 +12,19 @@ import mjwrap as mw
 from mjwrap.osim.description.functions import Piecewise, linear
 from mjwrap.osim.writing.piece_algebra import composed, flattened, preimage, weighted_sum
 
-POINT = '<PathPoint name="{name}"><socket_parent_frame>{frame}</socket_parent_frame><location>{at}</location></PathPoint>'
+POINT = """<PathPoint name="{name}"><socket_parent_frame>{frame}</socket_parent_frame>
+<location>{at}</location></PathPoint>"""
 CYLINDER = """<WrapCylinder name="{name}"><active>true</active><xyz_body_rotation>0 0 0</xyz_body_rotation>
 <translation>{at}</translation><quadrant>{quadrant}</quadrant><radius>{radius}</radius><length>{length}</length>
 </WrapCylinder>"""
 
 
-def osim(points: list[tuple[str, str, str]], wraps: str, listed: list[str], force: str = "PathActuator") -> str:
+def osim(
+    points: list[tuple[str, str, str]], wraps: str, listed: list[str], force: str = "PathActuator"
+) -> str:
     """Return an .osim text: a body that slides along x of ground, wrap objects on ground, and one path over them."""
-    path = "".join(POINT.format(name=n, frame="/ground" if f == "ground" else "/bodyset/b", at=at) for n, f, at in points)
+    frames = {"ground": "/ground", "b": "/bodyset/b"}
+    path = "".join(POINT.format(name=name, frame=frames[frame], at=at) for name, frame, at in points)
     over = "".join(
         f'<PathWrap name="w{k}"><wrap_object>{name}</wrap_object><method>hybrid</method><range>-1 -1</range></PathWrap>'
         for k, name in enumerate(listed)

@@ -148,7 +148,8 @@ def _sine(node: Node) -> Piecewise:
     coefficients = amplitude * omega**orders * np.sin(angle) / factorials
     coefficients[:, 0] += offset
     half = 0.5 * (edges[1] - edges[0]) * abs(omega)
-    error = abs(amplitude) * half ** (SINE_DEGREE + 1) / math.factorial(SINE_DEGREE + 1)
+    rounding = np.finfo(np.float64).eps * (abs(omega) * SINE_REACH + abs(phase) + 2.0)
+    error = abs(amplitude) * float(rounding + half ** (SINE_DEGREE + 1) / math.factorial(SINE_DEGREE + 1))
     node.note(
         f"is kept as {pieces} polynomials, {error:.1e} from the sine while its variable lies within ±{SINE_REACH:g}"
     )
