@@ -3,8 +3,8 @@
     python benchmarks/osim/freeze_mass.py FOLDER OUTPUT.json [MODEL.osim ...]
 
 It needs the package `opensim`. For each model, at seeded random values of the coordinates that follow no other, it
-stores these values, the position and rotation of two bodies, and M x for one vector x: M is the mass matrix for the rates
-of these coordinates. Point, weld and distance constraints are left aside, and locked coordinates released.
+stores these values, the position and rotation of two bodies, and M x for one vector x: M is the mass matrix for the
+rates of these coordinates. Point, weld and distance constraints are left aside, and locked coordinates released.
 """
 
 from __future__ import annotations

@@ -256,7 +256,13 @@ def main() -> int:
         "made by": "benchmarks/osim/freeze_muscles.py",
         "program": f"OpenSim {osim.GetVersion()}",
         "columns of states": ["activation", "excitation", "length", "speed", "fiber length"],
-        "columns of results": ["rigid", "equilibrium", "at fiber length", "fiber velocity", "activation rate"],
+        "columns of results": [
+            "rigid",
+            "equilibrium",
+            "at fiber length",
+            "fiber velocity",
+            "activation rate",
+        ],
         "sets": sets,
     }
     OUT.write_text(json.dumps(document, separators=(",", ":")) + "\n")

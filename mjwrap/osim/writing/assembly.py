@@ -1,4 +1,4 @@
-"""The default pose that satisfies all constraints: the nearest one to the default values of the coordinates, as OpenSim's."""
+"""The default pose, which satisfies all constraints: the nearest one to the default values, as in OpenSim."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _difference(first: Array, second: Array) -> Array:
 
 
 def residuals(model: OsimModel, branches: list[Branch], values: Values) -> Array:
-    """Return the errors (k,) of all constraints but couplers, and of the loops of the tree, at values of the coordinates."""
+    """Return the errors (k,) of all constraints but couplers, and of loops, at values of the coordinates."""
     poses = Poses(branches, values)
 
     def all_of_them() -> Iterator[Array]:
@@ -97,7 +97,9 @@ def assemble(model: OsimModel, branches: list[Branch], drivers: Drivers) -> None
     ]
     if not names or residuals(model, branches, drivers.value).size == 0:
         return
-    ease = np.array([FREE if drivers.coordinates[name].free_to_satisfy_constraints else 1.0 for name in names])
+    ease = np.array(
+        [FREE if drivers.coordinates[name].free_to_satisfy_constraints else 1.0 for name in names]
+    )
     home = np.array([start[name] for name in names])
 
     def errors(q: Array) -> Array:

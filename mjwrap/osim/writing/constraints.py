@@ -43,7 +43,9 @@ class _Writer:
 
     def between(self, kind: str, name: str, first: Frame, second: Frame) -> None:
         """Write a connect or weld equality between two frames."""
-        sites = [self.site(frame.body, placed(frame), f"{name}_{k}") for k, frame in ((1, first), (2, second))]
+        sites = [
+            self.site(frame.body, placed(frame), f"{name}_{k}") for k, frame in ((1, first), (2, second))
+        ]
         self.document.add("equality", kind, name=self.equalities.new(name), site1=sites[0], site2=sites[1],
                           solref=SOLREF, solimp=SOLIMP)  # fmt: skip
 
@@ -57,7 +59,9 @@ class _Writer:
 
     def distance(self, name: str, first: Frame, second: Frame, change: float) -> None:
         """Write that two points keep their distance at the default pose plus a change."""
-        sites = [self.site(frame.body, placed(frame), f"{name}_{k}") for k, frame in ((1, first), (2, second))]
+        sites = [
+            self.site(frame.body, placed(frame), f"{name}_{k}") for k, frame in ((1, first), (2, second))
+        ]
         self.document.add("equality", "tendon", name=self.equalities.new(name), tendon1=self.line(name, *sites),
                           polycoef=(change, 0, 0, 0, 0), solref=SOLREF, solimp=SOLIMP)  # fmt: skip
 
@@ -91,16 +95,18 @@ def write_constraints(document: Document, model: OsimModel, report: Report, skel
                 own = Frame(branch.body, np.zeros(3), np.eye(3))
                 writer.between("weld", name, Frame(branch.copy_of, np.zeros(3), np.eye(3)), own)
             report.add(branch.joint.kind, branch.joint.name, EXACT,
-                       f"closes a loop: half of '{branch.copy_of}' is carried by each joint, and both are welded")  # fmt: skip
+                       f"closes a loop: '{branch.copy_of}' is carried in equal parts by its joints, welded together")  # fmt: skip
     for constraint in model.constraints:
         if not isinstance(constraint, Coupler):
             _write(writer, constraint, poses)
             residual = float(np.abs(poses.residual(constraint)).max())
             report.add(type(constraint).__name__, constraint.name, EXACT,
                        f"holds at the default pose within {residual:.1e}")  # fmt: skip
-        elif skeleton.drivers.couplers[constraint.dependent] is not constraint:
-            report.add("CoordinateCouplerConstraint", constraint.name, LEFT_OUT,
-                       f"{constraint.dependent} already follows by '{skeleton.drivers.couplers[constraint.dependent].name}'")  # fmt: skip
+        else:
+            first = skeleton.drivers.couplers[constraint.dependent]
+            if first is not constraint:
+                report.add("CoordinateCouplerConstraint", constraint.name, LEFT_OUT,
+                           f"{constraint.dependent} already follows by '{first.name}'")  # fmt: skip
     _write_locks(document, report, skeleton)
     worst = worst_residual(model, skeleton.branches, skeleton.drivers.value)
     if worst > 1e-9:
@@ -134,9 +140,13 @@ def _write_locks(document: Document, report: Report, skeleton: Skeleton) -> None
             continue
         write_hold(document, driver[0])
         if coordinate.prescribed is None:
-            report.add("Coordinate", name, EXACT, f"locked: equality '{driver[0]}_locked' keeps its default value")
+            report.add(
+                "Coordinate", name, EXACT, f"locked: equality '{driver[0]}_locked' keeps its default value"
+            )
         elif coordinate.prescribed.is_constant:
-            report.add("Coordinate", name, EXACT, f"prescribed by a constant: equality '{driver[0]}_locked' keeps it")
+            report.add(
+                "Coordinate", name, EXACT, f"prescribed by a constant: equality '{driver[0]}_locked' keeps it"
+            )
         else:
-            report.add("Coordinate", name, APPROXIMATED, f"prescribed by a function of time: equality '{driver[0]}_locked' "
+            report.add("Coordinate", name, APPROXIMATED, f"prescribed by a function of time: '{driver[0]}_locked' "
                        "keeps its value at time 0")  # fmt: skip

@@ -37,7 +37,12 @@ class _Shape:
 
 class _Writer:
     def __init__(
-        self, document: Document, model: OsimModel, report: Report, skeleton: Skeleton, folders: Sequence[Path]
+        self,
+        document: Document,
+        model: OsimModel,
+        report: Report,
+        skeleton: Skeleton,
+        folders: Sequence[Path],
     ) -> None:
         self.document, self.report, self.files = document, report, MeshFiles(document, folders)
         self.names = UniqueNames(document, "geom")
@@ -98,20 +103,28 @@ class _Writer:
             inverse = inverse_mass[bodies[0]] + inverse_mass[bodies[1]]
             law = _law(force, first, second, self.weight)
             stiffness = min(law.stiffness * (1.0 - IMPEDANCE) * inverse, 0.2 / TIMESTEP**2)
-            damping = min(max(law.damping * (1.0 - IMPEDANCE) * inverse, 0.1 * stiffness**0.5), 0.9 / TIMESTEP)
+            damping = min(
+                max(law.damping * (1.0 - IMPEDANCE) * inverse, 0.1 * stiffness**0.5), 0.9 / TIMESTEP
+            )
             friction = law.friction
+            rough = friction > 0.0
             self.document.add("contact", "pair", geom1=first.geom, geom2=second.geom, solref=(-stiffness, -damping),
-                              solimp=(IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2), condim=3 if friction > 0.0 else 1,
-                              friction=(friction, friction, 0.005, 0.0001, 0.0001) if friction > 0.0 else None)  # fmt: skip
+                              solimp=(IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2), condim=3 if rough else 1,
+                              friction=(friction, friction, 0.005, 0.0001, 0.0001) if rough else None)  # fmt: skip
             written += 1
-            self.report.add(
-                force.kind, force.name, APPROXIMATED,
-                f"'{first.shape.name}' and '{second.shape.name}': a linear spring and damper in MuJoCo, as stiff as the "
-                f"file's force at the model's weight, {self.weight:.4g} N, where the indentation is "
-                f"{1e3 * law.indentation:.3g} mm; friction {friction:.3g} (dynamic; without the static and the viscous one)",
-            )  # fmt: skip
+            text = (
+                f"'{first.shape.name}' and '{second.shape.name}': a linear spring and damper in MuJoCo, as stiff as "
+                f"the file's force at the model's weight, {self.weight:.4g} N, where the indentation is "
+                f"{1e3 * law.indentation:.3g} mm; friction {friction:.3g}, the dynamic one; no static, no viscous one"
+            )
+            self.report.add(force.kind, force.name, APPROXIMATED, text)
         if not written:
-            self.report.add(force.kind, force.name, LEFT_OUT, "it has no two shapes on bodies that move against each other")
+            self.report.add(
+                force.kind,
+                force.name,
+                LEFT_OUT,
+                "it has no two shapes on bodies that move in each other",
+            )
 
 
 @dataclass(frozen=True)
@@ -159,7 +172,9 @@ def write_contacts(
         return
     compiled = mujoco.MjModel.from_xml_string(document.to_xml(), document.assets)
     names = {body: "world" if body == "ground" else body for body in document.bodies}
-    inverse_mass = {body: float(compiled.body_invweight0[compiled.body(name).id, 0]) for body, name in names.items()}
+    inverse_mass = {
+        body: float(compiled.body_invweight0[compiled.body(name).id, 0]) for body, name in names.items()
+    }
     for force in forces:
         if force.active:
             writer.pairs(force, inverse_mass)

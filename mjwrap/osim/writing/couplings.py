@@ -1,14 +1,16 @@
-"""Couplings between joints as joint equalities of MuJoCo: one for every piece of a function, only the present one active."""
+"""Couplings between joints as joint equalities: one for every piece of a function, only the present one active."""
 
 from __future__ import annotations
 
+from mjwrap.errors import OsimError
 from mjwrap.osim.description.functions import Piecewise
 from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.piece_algebra import shifted
 from mjwrap.osim.writing.quartics import DEGREE, quartic_pieces
+from mjwrap.osim.writing.sites import MOST_NUMBERS
 
 TIMESTEP = 0.001  # [s]
-# A joint equality has no term for the curvature of its function, so it has to correct fast and stiffly: within two steps.
+# A joint equality has no term for the curvature of its function, so it has to correct fast: within two steps.
 SOLREF = (2.0 * TIMESTEP, 1.0)
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
@@ -23,8 +25,16 @@ def write_coupling(
     """Write follower = function(leader), both given as name and reference value of a joint; return the pieces written.
 
     extent: of the leader, within which functions of a degree above 4 are approximated to 1e-10.
+
+    Raises:
+        OsimError: the function has more pieces than MuJoCo can hold.
     """
     pieces = quartic_pieces(function, *extent)
+    if len(pieces.origins) > MOST_NUMBERS:
+        raise OsimError(
+            f"joint '{follower[0]}' follows '{leader[0]}' by a function of {len(pieces.origins)} pieces; "
+            f"MuJoCo holds {MOST_NUMBERS}"
+        )
     (joint1, y), (joint2, x) = follower, leader
     present = int(pieces.piece(x))
     count = len(pieces.origins)

@@ -16,7 +16,6 @@ from mjwrap.osim.writing.quartics import TOLERANCE, inverse_pieces
 from mjwrap.osim.writing.tree import Branch, unused
 from mjwrap.osim.writing.unique_names import plain_name
 
-
 MOST_PIECES = 70  # of degree 4 in the 500 numbers of a numeric
 
 
@@ -26,7 +25,7 @@ class Substitute:
 
     joint: str
     motion: Motion
-    inverse: Piecewise
+    extent: tuple[float, float]  # of the coordinate, in which the motion rises or falls
     short_inverse: Piecewise  # with so few pieces that a numeric of MuJoCo can hold them
 
 
@@ -35,7 +34,8 @@ class Drivers:
     """The joints of coordinates.
 
     couplers: by dependent coordinate, each with its first coupler. carriers: the motion that shows a coordinate, by
-    its name. substitutes: by independent coordinate that no motion shows. values: of all coordinates at the default pose [rad or m].
+    its name. substitutes: by independent coordinate that no motion shows.
+    values: of all coordinates at the default pose [rad or m].
     """
 
     coordinates: dict[str, Coordinate]
@@ -52,24 +52,27 @@ class Drivers:
         function = coupler.function if coupler.scale == 1.0 else scaled(coupler.function, coupler.scale)
         return coupler.independent[0], function
 
-    def driver(self, name: str, *, precise: bool = False) -> tuple[str, Piecewise | None] | None:
+    def leader(self, name: str) -> tuple[str, Piecewise | None]:
+        """Return the coordinate with a joint that gives a coordinate, and by which function; None if it is the same."""
+        dependence = self.dependence(name)
+        if name in self.carriers or dependence is None:
+            return name, None
+        above, inner = self.leader(dependence[0])
+        return above, dependence[1] if inner is None else composed(dependence[1], inner)
+
+    def driver(self, name: str) -> tuple[str, Piecewise | None] | None:
         """Return the joint that gives a coordinate, and the coordinate as a function of its qpos; None: it is the qpos.
 
-        None instead of both where there is no such coordinate. precise: whether the function may have many pieces.
+        None instead of both where there is no such coordinate.
         """
         if name not in self.coordinates:
             return None
-        dependence = self.dependence(name)
-        if name in self.substitutes:
-            each = self.substitutes[name]
-            return each.joint, each.inverse if precise else each.short_inverse
-        if name in self.carriers or dependence is None:
-            return name, None
-        leader, function = dependence
-        above = self.driver(leader, precise=precise)
-        if above is None:
-            return None
-        return above[0], function if above[1] is None else composed(function, above[1])
+        leader, function = self.leader(name)
+        if leader not in self.substitutes:
+            return leader, function
+        substitute = self.substitutes[leader]
+        inverse = substitute.short_inverse
+        return substitute.joint, inverse if function is None else composed(function, inverse)
 
     def settle(self, independent: dict[str, float]) -> None:
         """Set the values of all coordinates from those of the independent ones."""
@@ -103,7 +106,7 @@ def drivers_of(model: OsimModel, branches: list[Branch]) -> Drivers:
                 continue
             if step.coordinate not in coordinates:
                 raise OsimError(
-                    f"{branch.joint.kind} '{branch.joint.name}': coordinate '{step.coordinate}' of {step.name} not found; "
+                    f"{branch.joint.kind} '{branch.joint.name}': coordinate '{step.coordinate}' not found; "
                     f"coordinates: {', '.join(coordinates)}"
                 )
             if _shows(step):
@@ -133,7 +136,12 @@ def _substitutes(
         inverse = inverse_pieces(step.function, low - room, high + room) if low < high else None
         if inverse is not None:
             joint = unused(plain_name(f"{branch.joint.name}_{step.name}"), taken)
-            found[name] = Substitute(joint, step, inverse, _shortened(step.function, low - room, high + room, inverse))
+            found[name] = Substitute(
+                joint,
+                step,
+                (low - room, high + room),
+                _shortened(step.function, low - room, high + room, inverse),
+            )
     return found
 
 
@@ -141,7 +149,7 @@ def _shortened(function: Piecewise, low: float, high: float, inverse: Piecewise)
     """Return the inverse of a function with at most as many pieces as a numeric holds."""
     tolerance = TOLERANCE
     while len(inverse.origins) > MOST_PIECES and tolerance < 1e-3:
-        tolerance *= 4.0
+        tolerance *= 10.0
         inverse = inverse_pieces(function, low, high, tolerance) or inverse
     return inverse
 

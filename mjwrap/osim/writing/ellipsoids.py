@@ -2,8 +2,8 @@
 
 The child's origin is at (a n_x, b n_y, c n_z), where n is its z axis, in the ellipsoid's frame. So its point at -a z
 stays in the plane x = 0, that at -b z in y = 0 and that at -c z in z = 0, as in a trammel. The child turns
-about the second of these points, which slides along x and z; that the two others stay in their planes is left to constraints.
-All of this is exact, without an approximated function.
+about the second of these points, which slides along x and z; constraints keep the two others in their planes. All of
+this is exact, without an approximated function.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ X, Y, Z = np.eye(3)
 class EllipsoidSlide(Motion):
     """A slide along x by offset n_x, or along z by offset n_z. `coordinate` is the second coordinate.
 
-    first: the name of the first coordinate; offset [m]: a - b or c - b. along_z: whether it slides along z. It follows both coordinates.
+    first: the name of the first coordinate; offset [m]: a - b or c - b. along_z: whether it slides along z.
     """
 
     first: str = ""
@@ -50,7 +50,7 @@ class EllipsoidSlide(Motion):
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """The motion across an ellipsoid joint: `onto` from the ellipsoid's frame to the moved frame, and what comes before and after.
+    """The motion across an ellipsoid joint: `onto` from its frame to the moved frame, and what comes before and after.
 
     planes: pairs of a point's place along z of the moved frame [m] and of the axis (3,) of the ellipsoid's frame that
     it stays perpendicular to.
@@ -90,10 +90,15 @@ def _ellipsoid(before: Array, radii: Array, names: list[str], after: Chain) -> E
     a, b, c = (float(radius) for radius in radii)
     onto: Chain = []
     planes: list[tuple[float, Array]] = []
-    for axis, radius, name, along_z in ((X, a, TRANSLATION_NAMES[0], False), (Z, c, TRANSLATION_NAMES[2], True)):
+    for axis, radius, name, along_z in (
+        (X, a, TRANSLATION_NAMES[0], False),
+        (Z, c, TRANSLATION_NAMES[2], True),
+    ):
         if radius != b:
             onto.append(
-                EllipsoidSlide(False, axis, names[1], constant(0.0), name, False, names[0], radius - b, along_z)
+                EllipsoidSlide(
+                    False, axis, names[1], constant(0.0), name, False, names[0], radius - b, along_z
+                )
             )
             planes.append((-radius, axis))
     onto += [

@@ -1,4 +1,4 @@
-"""What the rule for inertias that MuJoCo refuses does to a model: entries of the report, and the file's values kept beside."""
+"""What the rule for inertias that MuJoCo refuses does to a model: entries of the report, and the file's values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ def report_inertias(document: Document, report: Report, skeleton: Skeleton) -> N
     That is relative to its largest element, at the default pose. The numeric "mjwrap_inertia_BODY" keeps the principal
     moments of the file: written into `model.body_inertia` after compilation they undo the change.
     """
-    # Bodies of the file that carry joints' copies, or stand between two frames, are named like none in the file.
     changed = {name: written for name, written in skeleton.inertias.items() if written.original is not None}
     model = mujoco.MjModel.from_xml_string(document.to_xml()) if changed else None
     for branch in skeleton.branches:
@@ -35,11 +34,10 @@ def report_inertias(document: Document, report: Report, skeleton: Skeleton) -> N
             report.add("Body", branch.body, EXACT)
 
 
-def _report_changed(
-    document: Document, report: Report, body: str, written: Written, effect: float
-) -> None:
+def _report_changed(document: Document, report: Report, body: str, written: Written, effect: float) -> None:
     original, properties = written.original, written.properties
-    assert original is not None and properties is not None
+    assert original is not None
+    assert properties is not None
     now = properties.principal()[0]
     moments = f"principal moments {_listed(original)} -> {_listed(now)} kg m^2"
     if float(np.abs(now - original).max()) <= 1e-12 * float(np.abs(now).max()) and written.mass_added == 0.0:

@@ -1,4 +1,4 @@
-"""Masses and inertias that MuJoCo accepts: what is not physical is joined to welded bodies, or changed as little as possible."""
+"""Masses and inertias that MuJoCo accepts: what is not physical is joined to welded bodies, or changed a little."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ class MassProperties:
     def moved(self, transform: Array) -> MassProperties:
         """Return the same in the frame in which the body's own frame is at `transform` (4, 4)."""
         turn = transform[:3, :3]
-        return MassProperties(
-            self.mass, turn @ self.center + transform[:3, 3], turn @ self.inertia @ turn.T
-        )
+        return MassProperties(self.mass, turn @ self.center + transform[:3, 3], turn @ self.inertia @ turn.T)
 
     def joined(self, other: MassProperties) -> MassProperties:
         """Return those of two bodies together."""
@@ -81,9 +79,9 @@ def written_inertias(bodies: tuple[Body, ...], branches: list[Branch]) -> dict[s
     """Return what is written for every branch.
 
     The copies of a body that closes a loop share its mass, as in OpenSim. If a moving body's inertia is not physical,
-    the bodies welded to it are counted with it, and a body welded to another one whose inertia is not physical is counted
-    with that one: both are exact. What is still not physical gets the nearest principal moments that are (in the sense
-    of least squares), and at least a billionth of the model's mass, at 0.1 m.
+    the bodies welded to it are counted with it, and a welded body whose inertia is not physical is counted with the
+    one that carries it: both are exact. What is still not physical gets the nearest principal moments that are (in the
+    sense of least squares), and at least a billionth of the model's mass, at 0.1 m.
     """
     total = sum(body.mass for body in bodies) or 1.0
     copies = {body.name: 1 for body in bodies}
@@ -94,7 +92,7 @@ def written_inertias(bodies: tuple[Body, ...], branches: list[Branch]) -> dict[s
     own: dict[str, MassProperties] = {}
     for branch in branches:
         body = by_name.get(branch.copy_of or branch.body)
-        if body is None or branch.copy_of and branch.fixed:
+        if body is None or (branch.copy_of and branch.fixed):
             own[branch.body] = EMPTY
         else:
             whole = MassProperties(body.mass, body.mass_center, body.inertia)
@@ -112,7 +110,7 @@ def written_inertias(bodies: tuple[Body, ...], branches: list[Branch]) -> dict[s
     for branch in branches:
         name = branch.body
         properties = own[name]
-        if name in joined or branch.fixed and properties.mass == 0.0:
+        if name in joined or (branch.fixed and properties.mass == 0.0):
             out[name] = Written(None, joined.get(name, ""))
         elif branch.fixed or properties.physical:
             out[name] = Written(properties)
@@ -127,9 +125,7 @@ def _root(name: str, fixed: dict[str, Branch]) -> str:
     return name
 
 
-def _join(
-    name: str, branch: Branch, own: dict[str, MassProperties], joined: dict[str, str]
-) -> None:
+def _join(name: str, branch: Branch, own: dict[str, MassProperties], joined: dict[str, str]) -> None:
     """Count a welded body with its parent; a massless one, or one welded to ground, needs no more."""
     if branch.parent in own:
         here = evaluated(branch.chain, lambda _: 0.0)
@@ -150,6 +146,4 @@ def _nearest(properties: MassProperties, least: float) -> Written:
     if missing > -4e-16 * new[2]:
         new += np.array([1.0, 1.0, -1.0]) * (missing / 3.0 + 4e-16 * new[2])
     inertia = axes @ np.diag(new) @ axes.T
-    return Written(
-        MassProperties(mass, properties.center, inertia), "", moments, mass - properties.mass
-    )
+    return Written(MassProperties(mass, properties.center, inertia), "", moments, mass - properties.mass)

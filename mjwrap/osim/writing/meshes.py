@@ -114,7 +114,11 @@ def _checked_stl(content: bytes) -> bytes:
     if len(content) >= 84 and len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
         corners = np.frombuffer(content[84:], FACE)["corners"].astype(np.float64)
     else:
-        rows = [line.split()[1:4] for line in content.decode("latin-1").splitlines() if line.split()[:1] == ["vertex"]]
+        rows = [
+            line.split()[1:4]
+            for line in content.decode("latin-1").splitlines()
+            if line.split()[:1] == ["vertex"]
+        ]
         try:
             corners = np.array(rows, dtype=np.float64).reshape(-1, 3, 3)
         except ValueError:
@@ -150,9 +154,7 @@ def _primitive(mesh: Mesh) -> dict[str, Any]:
     raise MeshError(f"MuJoCo has no shape like {mesh.primitive}")
 
 
-def write_meshes(
-    document: Document, model: OsimModel, report: Report, folders: Sequence[Path]
-) -> None:
+def write_meshes(document: Document, model: OsimModel, report: Report, folders: Sequence[Path]) -> None:
     """Write all drawn shapes; files are searched in the folders in order, and what is missing is reported."""
     files = MeshFiles(document, folders)
     for mesh in (*model.ground_meshes, *(mesh for body in model.bodies for mesh in body.meshes)):

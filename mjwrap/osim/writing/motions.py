@@ -120,9 +120,7 @@ def spatial_chain(joint: Joint) -> Chain:
 
 def scaled(function: Piecewise, factor: float) -> Piecewise:
     """Return factor times a function."""
-    return replace(
-        function, coefficients=factor * function.coefficients, error=abs(factor) * function.error
-    )
+    return replace(function, coefficients=factor * function.coefficients, error=abs(factor) * function.error)
 
 
 def merged(chain: Chain) -> Chain:

@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Protocol
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
-from mjwrap.osim.description.functions import Array, Piecewise
+from mjwrap.osim.description.functions import Array, Piecewise, linear
+from mjwrap.osim.writing.piece_algebra import shifted
 
 DEGREE = 4
 TOLERANCE = 1e-10  # [rad or m] of an approximated piece
+IDENTITY = linear(1.0)
+MOST_PIECES = 400  # of one fit
 
 
-def quartic_pieces(function: Piecewise, low: float, high: float) -> Piecewise:
-    """Return a function with pieces of degree 4 at most, with continuous slope, within 1e-10 from `low` to `high`.
+def quartic_pieces(function: Piecewise, low: float, high: float, tolerance: float = TOLERANCE) -> Piecewise:
+    """Return a function with pieces of degree 4 at most, with continuous slope, close from `low` to `high`.
 
     A piece of degree 4 or less is kept as it is. Others are split until quartics that share values and slopes at both
     ends and the value in the middle are close enough; beyond `low` and `high` their last quartics go on.
     """
     rows = function.coefficients
     if not rows[:, DEGREE + 1 :].any():
-        return Piecewise(function.breaks, function.origins, rows[:, : DEGREE + 1], function.kind, function.error)
+        return Piecewise(
+            function.breaks, function.origins, rows[:, : DEGREE + 1], function.kind, function.error
+        )
     edges = np.concatenate([[-np.inf], function.breaks, [np.inf]])
-    made = _Made()
+    made = _Made(tolerance)
     for piece in range(len(rows)):
         left, right = float(edges[piece]), float(edges[piece + 1])
         if rows[piece, DEGREE + 1 :].any():
@@ -35,15 +42,23 @@ def quartic_pieces(function: Piecewise, low: float, high: float) -> Piecewise:
 
 
 def inverse_pieces(
-    function: Piecewise, low: float, high: float, tolerance: float = TOLERANCE
+    function: Piecewise,
+    low: float,
+    high: float,
+    tolerance: float = TOLERANCE,
+    outer: Piecewise = IDENTITY,
 ) -> Piecewise | None:
     """Return the inverse of a function that rises, or falls, from `low` to `high`; None where it does neither.
 
-    Straight lines are inverted exactly. Beyond the values at `low` and `high` the last pieces go on.
+    With `outer`, another function of the same variable, return outer(inverse).
+
+    Straight lines are inverted exactly, and the rest within the tolerance. Beyond the
+    values at `low` and `high` the last pieces go on.
     """
-    breaks = function.breaks[(function.breaks > low) & (function.breaks < high)]
+    breaks = np.union1d(function.breaks, outer.breaks)
+    breaks = breaks[(breaks > low) & (breaks < high)]
     knots = np.concatenate([[low], breaks, [high]])
-    slopes = function(np.concatenate([np.linspace(a, b, 50) for a, b in zip(knots[:-1], knots[1:], strict=True)]), 1)
+    slopes = function(np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(knots)]), 1)
     if slopes.max() * slopes.min() <= 0.0 or np.abs(slopes).min() < 1e-3 * np.abs(slopes).max():
         return None
     if slopes[0] < 0.0:
@@ -53,13 +68,16 @@ def inverse_pieces(
         middle = 0.5 * (knots[k] + knots[k + 1])
         piece = int(function.piece(middle))
         row, origin = function.coefficients[piece], float(function.origins[piece])
+        over = int(outer.piece(middle))
+        wide = shifted(outer, over, origin, outer.coefficients.shape[1])
         start, stop = float(function(knots[k])), float(function(knots[k + 1]))
         left = start if k else -np.inf
-        if row[2:].any():
-            single = Piecewise(np.zeros(0), function.origins[piece : piece + 1], row[None])
-            made.fit(_Inverse(single, float(knots[k]), float(knots[k + 1])), left, start, stop)
+        if row[2:].any() or wide[DEGREE + 1 :].any():
+            made.fit(
+                _Inverse(row, wide, float(knots[k]) - origin, float(knots[k + 1]) - origin), left, start, stop
+            )
         else:
-            made.add(left, float(row[0]), np.array([origin, 1.0 / row[1]]))
+            made.add(left, float(row[0]), wide / row[1] ** np.arange(len(wide)))
     return made.function(function.kind, 0.0)
 
 
@@ -72,28 +90,29 @@ class Smooth(Protocol):
 
 
 class _Inverse:
-    """The inverse of a function between two points, by bisection and Newton's method."""
+    """outer(inverse) of two polynomials in the same step, between two steps, by a table and Newton's method."""
 
-    def __init__(self, function: Piecewise, start: float, stop: float) -> None:
-        self._function, self._start, self._stop = function, start, stop
+    def __init__(self, row: Array, outer: Array, start: float, stop: float) -> None:
+        self._row, self._slope = row, polyder(row)
+        self._outer, self._outer_slope = outer, polyder(outer)
+        steps = np.linspace(start, stop, 65)
+        order = np.argsort(polyval(steps, row))
+        self._steps, self._table = steps[order], polyval(steps, row)[order]
 
     def __call__(self, x: Array, derivative: int = 0, /) -> Array:
-        """Return the inverse or its slope at x (n,)."""
-        low, high = np.full(np.shape(x), self._start), np.full(np.shape(x), self._stop)
-        for _ in range(30):
-            middle = 0.5 * (low + high)
-            below = self._function(middle) < x
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
-        y = 0.5 * (low + high)
-        for _ in range(3):
-            y = y - (self._function(y) - x) / self._function(y, 1)
-        return 1.0 / self._function(y, 1) if derivative else y
+        """Return the value or its slope at x (n,)."""
+        step = np.interp(x, self._table, self._steps)
+        for _ in range(5):
+            step = step - (polyval(step, self._row) - x) / polyval(step, self._slope)
+        if derivative:
+            return polyval(step, self._outer_slope) / polyval(step, self._slope)
+        return polyval(step, self._outer)
 
 
 class _Made:
     """Pieces in the making."""
 
-    def __init__(self, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
         self.breaks: list[float] = []
         self.origins: list[float] = []
@@ -109,39 +128,40 @@ class _Made:
 
     def fit(self, function: Smooth, left: float, start: float, stop: float) -> None:
         """Add quartics that follow a function from `start` to `stop`; the first one holds from `left` on."""
-        ends = _split(function, start, stop, self.tolerance)
-        for k in range(len(ends) - 1):
-            middle, row, error = _quartic(function, ends[k], ends[k + 1])
-            self.add(ends[k] if k else left, middle, row)
-            self.worst = max(self.worst, error)
+        count = 1
+        while True:
+            ends = np.linspace(start, stop, count + 1)
+            middles, rows, error = _quartics(function, ends)
+            if error <= self.tolerance or count >= MOST_PIECES:
+                break
+            # The error falls with the fifth power of the width.
+            count = min(max(count + 1, int(count * (error / self.tolerance) ** 0.2) + 1), MOST_PIECES)
+        for k in range(count):
+            self.add(float(ends[k]) if k else left, float(middles[k]), rows[k])
+        self.worst = max(self.worst, error)
 
     def function(self, kind: str, error: float) -> Piecewise:
         """Return the function that the pieces make."""
-        padded = np.zeros((len(self.rows), DEGREE + 1))
+        padded = np.zeros((len(self.rows), max(map(len, self.rows))))
         for k, row in enumerate(self.rows):
             padded[k, : len(row)] = row
         return Piecewise(np.array(self.breaks), np.array(self.origins), padded, kind, max(error, self.worst))
 
 
-def _split(function: Smooth, start: float, stop: float, tolerance: float) -> list[float]:
-    """Return ends of intervals on which quartics are close enough."""
-    if _quartic(function, start, stop)[2] <= tolerance or stop - start < 1e-4:
-        return [start, stop]
-    middle = 0.5 * (start + stop)
-    return _split(function, start, middle, tolerance)[:-1] + _split(function, middle, stop, tolerance)
-
-
-def _quartic(function: Smooth, start: float, stop: float) -> tuple[float, Array, float]:
-    """Return the middle of an interval, the quartic about it (5,), and its largest difference from a function."""
-    middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
-    ends = np.array([start, stop])
-    values, slopes = function(ends), function(ends, 1)
-    at_middle = float(function(np.array([middle]))[0])
-    even = 0.5 * (values[0] + values[1]) - at_middle
-    odd = 0.5 * (values[1] - values[0])
-    fourth = 0.25 * half * (slopes[1] - slopes[0]) - even
-    third = 0.5 * (0.5 * half * (slopes[0] + slopes[1]) - odd)
-    row = np.array([at_middle, (odd - third) / half, (even - fourth) / half**2, third / half**3, fourth / half**4])
-    x = middle + half * np.cos(np.linspace(0.0, np.pi, 21))
-    difference = np.polynomial.polynomial.polyval(x - middle, row) - function(x)
-    return middle, row, float(np.abs(difference).max())
+def _quartics(function: Smooth, ends: Array) -> tuple[Array, Array, float]:
+    """Return middles (n,) of intervals between ends (n + 1,), quartics about them (n, 5), and their largest error."""
+    middles, half = 0.5 * (ends[:-1] + ends[1:]), 0.5 * np.diff(ends)
+    values, slopes, at_middle = function(ends), function(ends, 1), function(middles)
+    even = 0.5 * (values[:-1] + values[1:]) - at_middle
+    odd = 0.5 * np.diff(values)
+    fourth = 0.25 * half * np.diff(slopes) - even
+    third = 0.5 * (0.5 * half * (slopes[:-1] + slopes[1:]) - odd)
+    rows = np.stack(
+        [at_middle, (odd - third) / half, (even - fourth) / half**2, third / half**3, fourth / half**4], 1
+    )
+    steps = half[:, None] * np.cos(np.linspace(0.0, np.pi, 15))
+    wanted = function((middles[:, None] + steps).ravel()).reshape(steps.shape)
+    found = np.zeros_like(steps)
+    for k in range(DEGREE, -1, -1):
+        found = found * steps + rows[:, k : k + 1]
+    return middles, rows, float(np.abs(found - wanted).max())

@@ -9,7 +9,7 @@ import numpy as np
 from mjwrap.osim.description.bodies import Coordinate
 from mjwrap.osim.description.functions import Array, Piecewise, linear
 from mjwrap.osim.description.model import OsimModel
-from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
+from mjwrap.osim.report import APPROXIMATED, EXACT, Report
 from mjwrap.osim.writing.assembly import assemble
 from mjwrap.osim.writing.couplings import write_coupling
 from mjwrap.osim.writing.document import Document
@@ -18,10 +18,10 @@ from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
 from mjwrap.osim.writing.inertias import Written, written_inertias
 from mjwrap.osim.writing.motions import Motion, evaluated
 from mjwrap.osim.writing.piece_algebra import composed, flattened
+from mjwrap.osim.writing.quartics import inverse_pieces
 from mjwrap.osim.writing.rotations import quaternion
 from mjwrap.osim.writing.sites import MOST_NUMBERS
 from mjwrap.osim.writing.tree import Branch, branches_of
-
 
 # The inertia of a body that only shows a coordinate, as a share of the model's mass: the error of a coupling through it
 # grows as it gets smaller, 4e-10 s^2 times force by mass at 1 ms.
@@ -51,7 +51,7 @@ class _Writer:
         self.taken = {*drivers.coordinates, *(each.joint for each in drivers.substitutes.values())}
         self.followers: list[tuple[str, float, str, Piecewise]] = []  # joint, reference, coordinate, function
         self.shown: set[str] = set()
-        self.references: dict[str, float] = {}
+        self.references = {name: drivers.value(name) for name in drivers.coordinates}
         self.ranges = {name: coordinate.range for name, coordinate in drivers.coordinates.items()}
         for name, each in drivers.substitutes.items():
             low, high = sorted(map(float, each.motion.function(drivers.coordinates[name].range)))
@@ -70,7 +70,11 @@ class _Writer:
         values = self.drivers.value
         home = evaluated(branch.chain, values)
         element = self.document.add(
-            self.document.bodies[branch.parent], "body", name=branch.body, pos=home[:3, 3], quat=quaternion(home[:3, :3])
+            self.document.bodies[branch.parent],
+            "body",
+            name=branch.body,
+            pos=home[:3, 3],
+            quat=quaternion(home[:3, :3]),
         )
         self.document.bodies[branch.body] = element
         after = np.eye(4)  # the body in the frame that a motion has moved
@@ -115,9 +119,7 @@ class _Writer:
         self.references[name] = reference
         return {"name": name, **attributes, "axis": axis, "ref": reference}
 
-    def limits(
-        self, coordinate: Coordinate, image: tuple[float, float] | None = None
-    ) -> dict[str, object]:
+    def limits(self, coordinate: Coordinate, image: tuple[float, float] | None = None) -> dict[str, object]:
         """Return range and limit of a coordinate's joint; what follows others, or starts outside, has no limit.
 
         image: the range of the joint where that is not the coordinate's.
@@ -168,15 +170,27 @@ class _Writer:
                             driver[1].error or float("nan"), "rad or m" if driver[1].error else "")  # fmt: skip
 
     def follow(self, joint: str, reference: float, coordinate: str, function: Piecewise) -> None:
-        driver = self.drivers.driver(coordinate, precise=True)
-        assert driver is not None
-        leader, inner = driver
+        """Write that a joint is a function of a coordinate, and report it."""
+        leader, inner = self.drivers.leader(coordinate)
         total = function if inner is None else composed(function, inner)
-        at = self.drivers.value(leader) if leader in self.drivers.coordinates else self.references[leader]
+        substitute = self.drivers.substitutes.get(leader)
+        if substitute is not None:
+            low, high = substitute.extent
+            shown = substitute.motion.function
+            for digits in (10, 9, 8):
+                found = inverse_pieces(shown, low, high, 10.0**-digits, total)
+                assert found is not None
+                if len(found.origins) <= MOST_NUMBERS:
+                    break
+            total = found
+            leader = substitute.joint
+        at = self.references[leader]
         low, high = self.ranges[leader]
         low, high = min(low, at), max(high, at)
         room = 0.1 * (high - low)
-        written = write_coupling(self.document, (joint, reference), (leader, at), total, (low - room, high + room))
+        written = write_coupling(
+            self.document, (joint, reference), (leader, at), total, (low - room, high + room)
+        )
         count = len(written.origins)
         self.report.add("Coupling", joint, APPROXIMATED if written.error > 0.0 else EXACT,
                         f"follows {leader} by {count} polynomial{'s' * (count > 1)}", written.error or float("nan"),

@@ -26,7 +26,7 @@ from mjwrap.osim.writing.motions import (
 
 @dataclass(frozen=True)
 class Plane:
-    """A point of one body that stays in a plane of another: through the origin of `frame` (4, 4), normal to `axis` (3,) in it.
+    """A point of one body that stays in a plane of another: through the origin of `frame` (4, 4), across `axis` (3,).
 
     place: the transform (4, 4) of a frame of the second body, `mover`, whose origin is the point.
     """
@@ -42,8 +42,9 @@ class Plane:
 class Branch:
     """A body with the joint that carries it; `chain` is its motion in its parent, another body or ground.
 
-    The body may be a frame between two bodies of the file that needs a body of its own. copy_of: the body that this one is part of, where the joint closes a loop; empty otherwise. backward: whether the joint's
-    child is the parent here.
+    The body may be a frame between two bodies of the file that needs one of its own.
+        copy_of: the body that this one is part of, where the joint closes a loop; empty otherwise. backward: whether the
+        joint's child is the parent here.
     """
 
     body: str
@@ -129,7 +130,9 @@ def _branches_across(
     onto = [start @ across.before, *across.onto]
     if not across.after:
         planes = tuple(
-            Plane(parent, start @ across.before, axis, body, inverse(end) @ moved(np.array([0.0, 0.0, place])))
+            Plane(
+                parent, start @ across.before, axis, body, inverse(end) @ moved(np.array([0.0, 0.0, place]))
+            )
             for place, axis in across.planes
         )
         return [Branch(body, parent, joint, merged([*onto, end]), copy_of, planes=planes)]
@@ -162,7 +165,9 @@ def _free_joint(body: str, taken: set[str]) -> Joint:
         )
     axes = [Axis(np.eye(3)[k % 3], (names[k],), linear(1.0)) for k in range(6)]
     coordinates = tuple(
-        Coordinate(each, name, "rotational" if k < 3 else "translational", 0.0, 0.0, (-np.pi, np.pi), False, False)
+        Coordinate(
+            each, name, "rotational" if k < 3 else "translational", 0.0, 0.0, (-np.pi, np.pi), False, False
+        )
         for k, each in enumerate(names)
     )
     home = Frame(GROUND, np.zeros(3), np.eye(3))
@@ -170,5 +175,3 @@ def _free_joint(body: str, taken: set[str]) -> Joint:
     return Joint(
         name, "FreeJoint", home, own, coordinates, (axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5])
     )
-
-

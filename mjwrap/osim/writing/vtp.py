@@ -1,8 +1,9 @@
-"""Triangles of .vtp files (VTK's XML polygons), in ASCII, in base64, or appended in base64 or raw; compressed by zlib or not."""
+"""Triangles of .vtp files (VTK's XML polygons): ASCII, base64, or appended, in base64 or raw; with zlib or without."""
 
 from __future__ import annotations
 
 import base64
+import itertools
 import re
 import zlib
 from xml.etree import ElementTree
@@ -93,7 +94,9 @@ class _Arrays:
                 try:
                     return self._numbers(array).astype(np.float64)
                 except (ValueError, IndexError, KeyError, zlib.error) as error:
-                    raise MeshError(f"has an array '{name or 'Points'}' that cannot be read: {error}") from None
+                    raise MeshError(
+                        f"has an array '{name or 'Points'}' that cannot be read: {error}"
+                    ) from None
         raise MeshError(f"lacks the array '{name or 'Points'}'")
 
     def _numbers(self, array: ElementTree.Element) -> NDArray[np.generic]:
@@ -117,7 +120,7 @@ class _Arrays:
         sizes = np.frombuffer(source.take(length), self.header)[3:]
         data = source.rest(length, int(sizes.sum()))
         ends = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-        return b"".join(zlib.decompress(data[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return b"".join(zlib.decompress(data[a:b]) for a, b in itertools.pairwise(ends))
 
 
 class _Raw:
