@@ -236,9 +236,10 @@ def test_traits_of_a_law_are_those_of_its_curves(law: type[FiberLaw]) -> None:
     row = parameter_row(found)
     assert len(row) == laws.PARAMS
     assert row[fiber.LEAST] == law.least * 0.1
-    _, _, below, _ = laws.length_curves(law.code, law.least)
+    curves = laws.curve_set(law.code, np.array([row]), 0)
+    _, _, below, _ = laws.length_curves(curves, law.least)
     assert below == pytest.approx(0.0, abs=1e-12)  # the shortest fibre has no passive force
-    slope = [laws.tendon_curve(law.code, x)[1] for x in (1.05, 1.06, 1.07)]
+    slope = [laws.tendon_curve(curves, x)[1] for x in (1.05, 1.06, 1.07)]
     growth, further = slope[1] / slope[0], slope[2] / slope[1]  # an exponential's slope grows by one factor
     assert (law.code in laws.EXPONENTIAL_TENDON) == (growth > 1.01 and further == pytest.approx(growth))
 

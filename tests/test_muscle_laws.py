@@ -31,7 +31,9 @@ EXTREMES = {
 }
 EACH = pytest.mark.parametrize(("law", "sizes"), [(n, s) for n in EVERY_LAW for s in (*MUSCLES, *EXTREMES)])
 # Thelen's force-velocity curve has a corner at rest, so that a rest there has no single rate
-SMOOTH_AT_REST = pytest.mark.parametrize(("law", "sizes"), [(n, s) for n in (*LAWS, "shaped") for s in MUSCLES])
+SMOOTH_AT_REST = pytest.mark.parametrize(
+    ("law", "sizes"), [(n, s) for n in (*LAWS, "shaped") for s in MUSCLES]
+)
 EACH_MUSCLE = pytest.mark.parametrize(("law", "sizes"), [(n, s) for n in EVERY_LAW for s in MUSCLES])
 BALANCE = 1e-8  # [F_max] imbalance of tendon and fibre that the project allows
 FASTEST = 99.0  # [v_max l_o] a fibre's velocity is bounded by 100
@@ -295,7 +297,9 @@ def test_slopes_of_the_balance(law: str, sizes: str) -> None:
         a, v = float(rng.uniform(0.05, 0.95)), float(rng.uniform(-0.8, 0.8))
         x = float(rng.uniform(max(0.6, 1.02 * height, params[0, fiber.LEAST] / optimal + 0.01), 1.5))
         stretch = float(rng.uniform(1.005, 1.05))
-        if law == "thelen" and (abs(v) < 1e-3 or abs(stretch - thelen.tendon_constants(0.04)[0] - 1.0) < 1e-3):
+        if law == "thelen" and (
+            abs(v) < 1e-3 or abs(stretch - thelen.tendon_constants(0.04)[0] - 1.0) < 1e-3
+        ):
             continue  # its curves have a corner, or a jump of their second derivative, there
         reach = stretch + ratio * math.sqrt(x * x - height * height)
         at = np.array([reach, x, a, v])
@@ -416,5 +420,7 @@ def test_order_of_the_step(law: str, sizes: str) -> None:
         orders = orders[np.array(errors)[1:, 0] > 2e-9 * optimal]
     assert len(orders) >= 2
     assert orders[:, 0].mean() > 2.6
-    assert law in ("millard", "shaped") or orders[:, 0].min() > 2.75  # Millard's curves have two continuous derivatives
+    assert (
+        law in ("millard", "shaped") or orders[:, 0].min() > 2.75
+    )  # Millard's curves have two continuous derivatives
     assert orders[1:, 1] == pytest.approx(1.0, abs=0.1)

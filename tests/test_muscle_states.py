@@ -343,7 +343,11 @@ def test_time_constants_stay_when_the_law_is_replaced() -> None:
 @pytest.mark.parametrize(
     ("actuator", "law", "words"),
     [
-        (pair("a"), mw.PathActuator(3.0), "must be DeGrooteFregly2016 or Millard2012, not PathActuator"),
+        (
+            pair("a"),
+            mw.PathActuator(3.0),
+            "must be DeGrooteFregly2016 or Millard2012 or Thelen2003, not PathActuator",
+        ),
         ('<muscle name="a" joint="elbow" lengthrange="-1 1"/>', None, "pulls no tendon"),
         (pair("a", 'gear="-1"'), None, "not positive, so it pushes"),
     ],

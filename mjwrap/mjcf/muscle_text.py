@@ -30,9 +30,9 @@ from mjwrap.mjcf.parameters import (
 )
 from mjwrap.mjcf.route_text import FINITE, Stop, read_route
 from mjwrap.mjcf.wrapping_geoms import SIZES
-from mjwrap.muscles.activation import FORMS
 from mjwrap.muscles import laws
-from mjwrap.muscles.laws import PASSIVE_LAWS, TENDONS, MuJoCoMuscle
+from mjwrap.muscles.activation import FORMS
+from mjwrap.muscles.laws import PASSIVE_LAWS, REFUSED, TENDONS, MuJoCoMuscle
 
 OBJ = mujoco.mjtObj
 NATIVE = ("lengthrange", "force", "range", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax", "timeconst")
@@ -153,6 +153,8 @@ def _check_law(
         raise ModelError(
             f"muscle '{name}' needs a law and its parameters: {needed}; {MuJoCoMuscle.law}: lengthrange"
         )
+    if law in REFUSED:
+        raise ModelError(f"muscle '{name}': law '{law}' is not supported: {REFUSED[law]}")
     if law not in LAWS:
         raise ModelError(f"law '{law}' does not exist; laws: {listed(LAWS)}")
     own = law == MuJoCoMuscle.law

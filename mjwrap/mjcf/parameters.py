@@ -16,6 +16,7 @@ from mjwrap.muscles import laws
 from mjwrap.muscles.activation import FORMS, ActivationDynamics
 from mjwrap.muscles.laws import (
     PASSIVE_LAWS,
+    REFUSED,
     SEVERAL,
     TENDONS,
     ActuatorForce,
@@ -108,6 +109,8 @@ def build_law(
     tendon: "rigid" or "elastic", None if the tuple does not say; only for laws with a tendon. native: under MuJoCo's
     own law the force is that which MuJoCo computes for the actuator, of any kind.
     """
+    if law in REFUSED:
+        raise ModelError(f"law '{law}' is not supported: {REFUSED[law]}")
     if law not in LAWS:
         raise ModelError(f"law '{law}' does not exist; laws: {listed(LAWS)}")
     needed, other = LAWS[law]

@@ -6,6 +6,7 @@ process lives, and what is made here is kept until its end: about 15 kB for each
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -76,7 +77,7 @@ def ligament_curve(breaks: list[float], origins: list[float], coefficients: list
         pieces += _rectified(ends[k], ends[k + 1], origin, row)
     # constants that make the curve's integral continuous, and zero at one
     constants = [0.0]
-    for piece, following in zip(pieces, pieces[1:], strict=False):
+    for piece, following in itertools.pairwise(pieces):
         start = following[0]
         constants.append(constants[-1] + _primitive(piece, start) - _primitive(following, start))
     starts = [piece[0] for piece in pieces]
@@ -95,7 +96,7 @@ def _rectified(start: float, end: float, origin: float, row: list[float]) -> lis
     real = sorted(float(r.real) + origin for r in np.atleast_1d(roots) if abs(complex(r).imag) < 1e-12)
     cuts = [start, *(x for x in real if start < x < end), end]
     parts: list[list[float]] = []
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in itertools.pairwise(cuts):
         if not low < high:
             continue
         middle = (
@@ -114,4 +115,6 @@ def _primitive(piece: list[float], x: float) -> float:
     return sum(c * s ** (i + 1) / (i + 1) for i, c in enumerate(piece[2:]))
 
 
-assert thelen.SIZE == 10 and own_curves.BEZIER_SIZE == 6 and ligament.WIDTH == 7
+assert thelen.SIZE == 10
+assert own_curves.BEZIER_SIZE == 6
+assert ligament.WIDTH == 7

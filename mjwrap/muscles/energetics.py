@@ -95,8 +95,9 @@ class Energetics:
     """Energies and powers of n muscles at one instant, as arrays (n,); power is positive if it is delivered.
 
     A fibre or tendon that shortens under tension delivers power; one that is stretched absorbs it. Muscles without
-    fibres (MuJoCo's, the path actuator) have only `muscle_power`; the rest is zero. `tendon_power` and `tendon_energy`
-    are zero with a rigid tendon. Heats, work and `metabolic_power` are zero without an `Umberger2010`.
+    fibres (MuJoCo's, the path actuator) have only `muscle_power`; the rest is zero. Ligaments and springs have the
+    power and the energy of a tendon, and springs that of their damping too. `tendon_power` and `tendon_energy` are zero
+    with a rigid tendon. Heats, work and `metabolic_power` are zero without an `Umberger2010`.
 
     Attributes:
         fiber_velocity: [m/s], positive when lengthening.

@@ -104,7 +104,7 @@ class Millard2012(FiberLaw):
     @property
     def damping(self) -> float:
         """Return the fibre damping: the given one, none where the muscle is undamped."""
-        return self.fiber_damping if not self.tendon == "elastic" or self.fiber_damping >= LEAST_DAMPING else 0.0
+        return self.fiber_damping if self.tendon != "elastic" or self.fiber_damping >= LEAST_DAMPING else 0.0
 
     @property
     def least_activation(self) -> float:

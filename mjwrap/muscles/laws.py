@@ -22,6 +22,7 @@ from mjwrap.muscles.passive_laws import Ligament, PathSpring
 __all__ = [
     "LAWS",
     "PASSIVE_LAWS",
+    "REFUSED",
     "SEVERAL",
     "TENDONS",
     "ActuatorForce",
@@ -161,6 +162,14 @@ class PathActuator:
         return (self.optimal_force,)
 
 
+# Laws of other programs that mjwrap does not have, and why.
+REFUSED: dict[str, str] = {
+    "schutte_1993": (
+        "OpenSim's Schutte1993Muscle_Deprecated has curves that are splines in its file, a time scale in place of "
+        "time constants, and an implicit force-velocity relation with its own damping, which mjwrap does not compute; "
+        "Thelen's and Millard's muscles take its forces and lengths"
+    )
+}
 PASSIVE_LAWS: tuple[type[Law], ...] = (Ligament, PathSpring)  # no activation changes their tension
 # Parameters that are lists of numbers, and how many they may have; nothing said: the law checks it.
 SEVERAL: dict[str, tuple[int, ...]] = {**millard_curves.COUNTS, "ligament_curve": ()}

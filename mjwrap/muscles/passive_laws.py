@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,7 +61,7 @@ class Ligament:
                 f"{LARGEST_DEGREE + 1} coefficients; it has {len(values)} numbers"
             )
         breaks, origins = values[1:count], values[count : 2 * count]
-        if any(later <= earlier for earlier, later in zip(breaks, breaks[1:], strict=False)):
+        if any(later <= earlier for earlier, later in itertools.pairwise(breaks)):
             raise ModelError(f"{what}: the places between pieces must ascend: {breaks}")
         rest = values[2 * count :]
         rows = [rest[width * k : width * (k + 1)] + [0.0] * (4 - width) for k in range(count)]

@@ -45,7 +45,7 @@ def advance(form, a, u, activation_time, deactivation_time, smoothing, duration)
 
 @jit
 def rate_above(form, u, a, times, m, least):
-    """Return da/dt [1/s] of an activation that is not less than `least`; times (n, 3 or more): constants of muscle m."""
+    """Return da/dt [1/s] of an activation that is not less than `least`; times (n, 3 or more): constants."""
     held = least if a < least else a
     growth = rate(form, u, held, times[m, 0], times[m, 1], times[m, 2])
     return 0.0 if growth < 0.0 and held <= least and least > 0.0 else growth
@@ -53,7 +53,7 @@ def rate_above(form, u, a, times, m, least):
 
 @jit
 def advance_above(form, a, u, times, m, least, duration):
-    """Return the activation after `duration` [s], not less than `least`; times (n, 3 or more): constants of muscle m."""
+    """Return the activation after `duration` [s], not less than `least`; times (n, 3 or more): constants."""
     held = least if a < least else a
     new = advance(form, held, u, times[m, 0], times[m, 1], times[m, 2], duration)
     return least if new < least else new  # what is not a number stays that

@@ -111,7 +111,7 @@ def near_inverse(address, y):
 
 @jit
 def inverse(address, y):
-    """Return x at which a rising curve has the value y, also on its end tangents; the nearer end where they are flat."""
+    """Return x at which a rising curve has the value y, on its end tangents too; where they are flat, that end."""
     corner, count = corners_of(address)
     low = read(corner, Y0)
     if y <= low:
@@ -144,7 +144,7 @@ def _corner_integral(corner, u):
 
 @jit
 def integral(address, x):
-    """Return the integral of a curve from the start of its first corner to x, exact up to rounding; as in `bezier.py`."""
+    """Return the integral of a curve from the start of its first corner to x, as `bezier.integral`."""
     corner, count = corners_of(address)
     past = x - read(corner, X0)
     if past <= 0.0:

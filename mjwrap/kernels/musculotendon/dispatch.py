@@ -43,7 +43,9 @@ WITHOUT_FIBER = (PATH_ACTUATOR, MUJOCO, LIGAMENT, PATH_SPRING)
 PASSIVE = (LIGAMENT, PATH_SPRING)
 # laws whose tendon curve is an exponential: the search for a balance takes its logarithm
 EXPONENTIAL_TENDON = (DEGROOTE_FREGLY,)
-LONGEST_START = 1.08  # [l_s] longest tendon with which an iteration starts, for curves that are not a muscle's own
+LONGEST_START = (
+    1.08  # [l_s] longest tendon with which an iteration starts, for curves that are not a muscle's own
+)
 NAN = math.nan
 
 

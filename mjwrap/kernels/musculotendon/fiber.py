@@ -12,7 +12,13 @@ from __future__ import annotations
 import math
 
 from mjwrap.kernels.compilation.jit import from_python, jit
-from mjwrap.kernels.musculotendon.dispatch import CURVES, curve_set, length_curves, tendon_curve, velocity_force
+from mjwrap.kernels.musculotendon.dispatch import (
+    CURVES,
+    curve_set,
+    length_curves,
+    tendon_curve,
+    velocity_force,
+)
 from mjwrap.kernels.musculotendon.equilibrium import (
     AT_MINIMUM,
     MAX_EVALUATIONS,
@@ -251,7 +257,9 @@ def fiber_rate(law, params, m, activation, length, fiber):
     pull, _ = tendon_curve(curves, (length - along * optimal) / slack)
     active, _, passive, _ = length_curves(curves, x)
     wanted = pull * x / along - passive if along > 0.0 else math.inf  # at a right angle
-    v, _, _, _ = balancing_velocity(curves, activation, activation * active, damping, wanted, LAST_VELOCITY_STEP)
+    v, _, _, _ = balancing_velocity(
+        curves, activation, activation * active, damping, wanted, LAST_VELOCITY_STEP
+    )
     if fiber <= params[m, LEAST] and v < 0.0:
         return 0.0
     return v * params[m, V_MAX] * optimal

@@ -13,7 +13,7 @@ STIFFNESS, RESTING, DISSIPATION = range(3)
 
 @jit
 def tension(params, m, length, speed):
-    """Return stiffness x stretch x (1 + dissipation x speed) [N]; zero where that is negative, or there is no stretch."""
+    """Return stiffness x stretch x (1 + dissipation x speed) [N], zero where that is negative or without stretch."""
     stretch = max(length - params[m, RESTING], 0.0)
     return max(params[m, STIFFNESS] * stretch * (1.0 + params[m, DISSIPATION] * speed), 0.0)
 

@@ -24,7 +24,10 @@ ACTIVE_SHAPE, PASSIVE_SHAPE, FIBER_STRAIN, CONCENTRIC, MOST, THRESHOLD = range(2
 TOE_STRAIN, STIFFNESS = 8, 9
 SIZE = 10
 
-TOE_SHAPE, TOE_FORCE = 3.0, 33.0 / 100.0  # shape of the tendon's exponential, force at which it becomes straight
+TOE_SHAPE, TOE_FORCE = (
+    3.0,
+    33.0 / 100.0,
+)  # shape of the tendon's exponential, force at which it becomes straight
 
 
 def tendon_constants(strain: float) -> tuple[float, float]:
