@@ -9,6 +9,7 @@ from moving_models import Leg, random_leg, random_pose
 
 import mjwrap as mw
 from mjwrap.checking import check_model
+from mjwrap.cli.inspect.declared import table
 from mjwrap.kernels import layout
 from mjwrap.mjcf.conditional_points import MOST, JointRange, TooManyAlternatives, alternatives, holds
 from mjwrap.poses.joint_curves import curves
@@ -68,7 +69,7 @@ def test_exactly_one_alternative_holds_everywhere() -> None:
         holding = [c for c, route in enumerate(declared.routes) if holds(model, route.when, data.qpos)]
         assert len(holding) == 1
         muscles.forward(data)
-        hip, knee = data.qpos[:2]
+        hip, knee = (float(q) for q in data.qpos[:2])
         sites = ["pelvis"]
         sites += ["patella"] * (LOW <= knee <= HIGH and hip >= -0.3)
         sites += ["pes"] * (0.1 <= knee <= 0.6) + ["front"] * (-0.1 <= hip <= 0.2) + ["shin"]
@@ -173,6 +174,11 @@ def test_texts_of_conditional_points() -> None:
     assert f"pelvis &gt; patella &gt; shin, where knee is in [{LOW}, {HIGH}]" in text
     assert f"pelvis &gt; shin, where knee is not in [{LOW}, {HIGH}]" in text
     assert "when not (joint 1 in" in repr(muscles.declarations[0])
+    listed = table(muscles.model, muscles.declarations)
+    assert f"pelvis > patella > shin, patella only where knee is in [{LOW}, {HIGH}]" in listed
+    apart, _ = system(one_range("pelvis", "patella?knee -1 0", "pes?knee 0.1 1", "shin"))
+    listed = table(apart.model, apart.declarations)  # no pose has both points
+    assert "pelvis > patella > shin, where knee is in [-1, 0] and knee is not in [0.1, 1] / pelvis" in listed
 
 
 def _error(old: str, new: str) -> str:

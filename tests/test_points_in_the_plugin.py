@@ -190,6 +190,36 @@ def test_transmission_without_a_column_is_refused() -> None:
         install(leg.xml(), "transmission")
 
 
+def test_recorded_moment_arms_contain_moving_points() -> None:
+    """Of a MuscleSystem, of the plugin, and of two instances of the plugin in one model."""
+    text = random_leg(2).xml()
+    muscles = mw.MuscleSystem(mujoco.MjModel.from_xml_string(text))
+    data = started(muscles.model, 3)
+    muscles.forward(data)
+    expected = -muscles.length_jacobian(data)
+    pairs = np.repeat(np.arange(3), 3), np.tile(np.arange(3), 3)
+
+    def recorded(results: mw.MuscleSystem | Muscles, poses: mujoco.MjData, first: int) -> np.ndarray:
+        history = results.history(1, pairs[0] + first, pairs[1] + first)
+        history.put_frame(0, results.poses(poses), None)
+        return history.moment_arms(1).reshape(3, 3)
+
+    np.testing.assert_array_equal(recorded(muscles, data, 0), expected)
+    alone, parent = mujoco.MjSpec.from_string(text), mujoco.MjSpec()
+    parent.option.timestep, parent.option.integrator = alone.option.timestep, alone.option.integrator
+    mw.install(alone)
+    mw.install(other := mujoco.MjSpec.from_string(text))
+    parent.attach(alone, prefix="a_", frame=parent.worldbody.add_frame())
+    parent.attach(other, prefix="b_", frame=parent.worldbody.add_frame())
+    for model, legs in ((mw.install(mujoco.MjSpec.from_string(text)), 1), (parent.compile(), 2)):
+        installed = mujoco.MjData(model)
+        installed.qpos[:] = np.tile(data.qpos, legs)
+        mujoco.mj_forward(model, installed)
+        for leg in range(legs):
+            found = recorded(Muscles(installed), installed, 3 * leg)
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-13)
+
+
 def test_attached_models_keep_their_points() -> None:
     """Two legs under prefixes in one model move as one alone."""
     text, parent = leg_over_edges(1).xml(), mujoco.MjSpec()

@@ -55,6 +55,13 @@ SCENE = """
   </custom>
 </mujoco>
 """
+MOVING = """
+    <numeric name="insertion_x" data="1 0 .2 .1"/>
+    <tuple name="mjwrap_moving_insertion">
+      <element objtype="site" objname="insertion"/><element objtype="joint" objname="slide" prm="0"/>
+      <element objtype="numeric" objname="insertion_x"/>
+    </tuple>
+  </custom>"""  # with this SCENE has a moving point
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -158,7 +165,8 @@ def paths() -> None:
 
 def muscles() -> None:
     """Evaluate and step a MuscleSystem, and simulate a single muscle."""
-    evaluate(mujoco.MjModel.from_xml_string(SCENE))
+    for text in (SCENE, SCENE.replace("</custom>", MOVING)):
+        evaluate(mujoco.MjModel.from_xml_string(text))
     laws()
 
 

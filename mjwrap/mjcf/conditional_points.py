@@ -64,13 +64,19 @@ def when_text(model: mujoco.MjModel, when: Sequence[Presence]) -> str:
     return f", where {' and '.join(words)}" if words else ""
 
 
+def ranges_text(model: mujoco.MjModel, ranges: Sequence[JointRange]) -> str:
+    """Return in words, with the joints' names, that joints are within ranges."""
+    names = [name_of(model, mujoco.mjtObj.mjOBJ_JOINT, each.joint) for each in ranges]
+    return " and ".join(
+        f"{name} is in [{r.low:g}, {r.high:g}]" for name, r in zip(names, ranges, strict=True)
+    )
+
+
 def _in_words(model: mujoco.MjModel, ranges: Sequence[JointRange], holding: bool) -> str:
-    parts = [
-        f"{name_of(model, mujoco.mjtObj.mjOBJ_JOINT, r.joint)} is in [{r.low:g}, {r.high:g}]" for r in ranges
-    ]
+    text = ranges_text(model, ranges)
     if holding:
-        return " and ".join(parts)
-    return parts[0].replace(" is in ", " is not in ") if len(parts) == 1 else f"not ({' and '.join(parts)})"
+        return text
+    return text.replace(" is in ", " is not in ") if len(ranges) == 1 else f"not ({text})"
 
 
 class _Route(Protocol):

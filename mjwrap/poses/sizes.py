@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.mjcf.conditional_points import holds
 
 Array = NDArray[np.float64]
 Leg = tuple[
@@ -44,7 +45,6 @@ def route_size(
 def muscle_size(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> float:
     """Return the size of a declared muscle at the given poses [m]."""
     legs: list[Leg] = []
-    for route in muscle.routes:
-        stops = [route.origin, *(node.site for node in route.nodes if node.site >= 0), route.insertion]
-        legs += [(a, b, route.weight) for a, b in itertools.pairwise(stops)]
+    for route in (r for r in muscle.routes if holds(model, r.when, poses.qpos)):
+        legs += [(a, b, route.weight) for a, b in itertools.pairwise(route.sites)]
     return route_size(model, poses, legs, muscle.geoms)

@@ -13,6 +13,7 @@ import numpy as np
 
 from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.mjcf.conditional_points import holds
 from mjwrap.paths import Status
 from mjwrap.surfaces import Sphere
 from mjwrap.system import MuscleSystem
@@ -34,12 +35,12 @@ def moment_arm_break(muscles: MuscleSystem, data: mujoco.MjData, i: int, size: f
                 if not row[layout.INSIDE] and abs(swept - math.pi) <= NEAR:
                     return TIE
     poses = muscles.poses(data)
-    for route in muscles.declarations[i].routes:
-        stops = [route.origin, *(n.site for n in route.nodes if n.site >= 0), route.insertion]
-        if (np.linalg.norm(np.diff(poses.site_xpos[stops], axis=0), axis=1) <= NEAR * size).any():
+    model = muscles.model
+    for route in (r for r in muscles.declarations[i].routes if holds(model, r.when, poses.qpos)):
+        if (np.linalg.norm(np.diff(poses.site_xpos[route.sites], axis=0), axis=1) <= NEAR * size).any():
             return KINK
         for node, *ends in route.geom_ends():
-            if node.inside and any(_on_surface(muscles.model, poses, node.geom, end, size) for end in ends):
+            if node.inside and any(_on_surface(model, poses, node.geom, end, size) for end in ends):
                 return KINK
     return ""
 
@@ -49,7 +50,7 @@ def lacks_minimum(muscles: MuscleSystem, data: mujoco.MjData, i: int) -> bool:
     if muscles.status[i] != Status.NOT_MINIMAL:
         return False
     poses = muscles.poses(data)
-    for route in muscles.declarations[i].routes:
+    for route in (r for r in muscles.declarations[i].routes if holds(muscles.model, r.when, poses.qpos)):
         for node, *ends in route.geom_ends():
             if isinstance(node.surface, Sphere) and not node.inside:
                 a, b = (poses.site_xpos[end] - poses.geom_xpos[node.geom] for end in ends)

@@ -10,6 +10,7 @@ from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import finite_checks
 from mjwrap.kernels.geometry.dispatch import height
 from mjwrap.mjcf import MuscleDeclaration, name_of
+from mjwrap.mjcf.conditional_points import holds
 from mjwrap.model.arrays import kernel_rows
 
 _BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
@@ -26,7 +27,7 @@ def resets(data: mujoco.MjData) -> int:
 def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> str:
     """Return as text which sites of a muscle lie inside their neighbouring surfaces at the given poses, or ""."""
     found = []
-    for route in muscle.routes:
+    for route in (r for r in muscle.routes if holds(model, r.when, poses.qpos)):
         for node, before, after in route.geom_ends():
             if node.inside:
                 continue

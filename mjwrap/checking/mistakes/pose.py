@@ -13,6 +13,7 @@ from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import muscle_paths
 from mjwrap.kernels.solved import segments
 from mjwrap.mjcf import MuscleDeclaration
+from mjwrap.mjcf.conditional_points import holds
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.poses.sizes import LEAST, turning_dofs
@@ -85,9 +86,8 @@ class Posed:
 def _size(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> float:
     """Return the distances of a muscle's stops added up [m]: unlike `muscle_size`, whatever its surfaces' sizes are."""
     total = 0.0
-    for route in muscle.routes:
-        stops = [route.origin, *(node.site for node in route.nodes if node.site >= 0), route.insertion]
-        steps = np.diff(poses.site_xpos[stops], axis=0)
+    for route in (r for r in muscle.routes if holds(model, r.when, poses.qpos)):
+        steps = np.diff(poses.site_xpos[route.sites], axis=0)
         total += route.weight * float(np.linalg.norm(steps, axis=1).sum())
     return max(total, LEAST * float(model.stat.extent), 1e-300)
 

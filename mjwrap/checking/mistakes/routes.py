@@ -13,6 +13,7 @@ from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetr
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf import MuscleDeclaration, Route, name_of
 from mjwrap.mjcf.actuators import is_muscle
+from mjwrap.mjcf.conditional_points import holds
 from mjwrap.system import pulls_as_cable
 
 Array = NDArray[np.float64]
@@ -83,7 +84,7 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration, hints: bool) -> I
             "put the hint or side site where the muscle should touch",
         )
     yield from _of_lengths(model, muscle, float(posed.sizes[i]))
-    for route in muscle.routes:
+    for route in (r for r in muscle.routes if holds(model, r.when, posed.data.qpos)):
         yield from _of_stops(posed, i, muscle, route)
         yield from _of_side_sites(posed, muscle, route)
 

@@ -12,6 +12,7 @@ from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetr
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.checking.mistakes.unread import is_read, tuple_elements
 from mjwrap.mjcf import MuscleDeclaration, Node, name_of
+from mjwrap.mjcf.conditional_points import holds
 from mjwrap.mjcf.wrapping_geoms import SIZES, size_keys
 
 Array = NDArray[np.float64]
@@ -32,8 +33,12 @@ def surface_mistakes(posed: Posed) -> Iterator[PossibleMistake]:
     for i, muscle in enumerate(posed.muscles.declarations):
         touched = iter(posed.touched[i])
         for route in muscle.routes:
+            here = holds(posed.model, route.when, posed.data.qpos)
             for node, *ends in route.geom_ends():
-                finding = _of_surface(posed, i, muscle, node, ends, next(touched), node.geom in listed)
+                touches = next(touched)
+                if not here:
+                    continue
+                finding = _of_surface(posed, i, muscle, node, ends, touches, node.geom in listed)
                 if finding is not None and (finding.kind, finding.element) not in told:
                     told.add((finding.kind, finding.element))
                     yield finding

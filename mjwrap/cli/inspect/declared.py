@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import mujoco
 
 from mjwrap.calibration.plausibility import as_unit
 from mjwrap.mjcf import MuscleDeclaration, Node, Route, name_of
-from mjwrap.mjcf.conditional_points import when_text
+from mjwrap.mjcf.conditional_points import JointRange, ranges_text, when_text
 from mjwrap.mjcf.moving_points import site_text
 from mjwrap.text import aligned
 
@@ -30,7 +30,7 @@ def table(model: mujoco.MjModel, muscles: Sequence[MuscleDeclaration]) -> str:
         unit = as_unit(muscle.parameters)
         sizes = [_size(unit.peak, 1.0), _size(unit.optimal, 1e3), _size(unit.slack, 1e3)]
         tendon = getattr(muscle.parameters, "tendon", "rigid" if muscle.law == "mujoco" else "")
-        path = " | ".join(path_text(model, route) for route in muscle.routes)
+        path = " | ".join(piece_text(model, routes) for routes in muscle.pieces)
         rows.append((muscle.name, muscle.law, *sizes, tendon, path))
     return "\n".join(aligned(rows, _WORDS))
 
@@ -39,12 +39,38 @@ def _size(value: float, scale: float) -> str:
     return f"{scale * value:.4g}" if math.isfinite(value) else "-"
 
 
-def path_text(model: mujoco.MjModel, route: Route) -> str:
-    """Return the sites and surfaces of a route in words."""
+def piece_text(model: mujoco.MjModel, routes: Sequence[Route]) -> str:
+    """Return the alternative routes of a piece of string as one, with the ranges of its conditional points.
+
+    Where no pose has all points, the alternatives are listed, each with the poses at which it holds.
+    """
+    whole = [route for route in routes if all(presence.holds for presence in route.when)]
+    conditions = {site: _condition(routes, site) for route in routes for site in route.sites}
+    if not whole or len(routes) == 1:
+        return " / ".join(path_text(model, route) for route in routes)
+    text = path_text(model, replace(whole[0], when=()), whole=True)
+    told = [
+        f"{_site(model, site)} only where {ranges_text(model, ranges)}"
+        for site, ranges in conditions.items()
+        if ranges
+    ]
+    return f"{text}, {', '.join(told)}"
+
+
+def _condition(routes: Sequence[Route], site: int) -> tuple[JointRange, ...]:
+    """Return the ranges in which a site belongs to the path, none for one that always does."""
+    for point, presence in enumerate(routes[0].when):
+        if all((site in route.sites) == route.when[point].holds for route in routes):
+            return presence.ranges
+    return ()
+
+
+def path_text(model: mujoco.MjModel, route: Route, whole: bool = False) -> str:
+    """Return the sites and surfaces of a route in words; whole: name every via point."""
     stops = [site_text(model, route.moving, route.origin)]
     for is_via, group in itertools.groupby(route.nodes, lambda node: node.surface is None):
         nodes = list(group)
-        if is_via and len(nodes) > 1 and not (route.when or route.moving):
+        if is_via and len(nodes) > 1 and not (route.when or route.moving or whole):
             stops.append(f"{len(nodes)} via points")
         else:
             stops += [_stop(model, route, node) for node in nodes]

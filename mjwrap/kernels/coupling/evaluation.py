@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjwrap.kernels.compilation.jit import jit, no_inline
+from mjwrap.kernels.compilation.jit import inlined, no_inline
 from mjwrap.kernels.coupling.muscle_paths import measure_muscles, solve_routes
 from mjwrap.kernels.coupling.path_points import (
     add_point_speeds,
@@ -15,7 +15,7 @@ from mjwrap.kernels.coupling.wrenches import body_wrenches
 from mjwrap.kernels.musculotendon.dynamics import drive_muscles, read_states
 
 
-@jit
+@inlined
 def _pull(routes, muscles, poses, inputs, timing, paths, start, states, wrench):
     """Compute tensions and body wrenches along solved paths; return whether some muscle has no path."""
     read_states(muscles, inputs, timing, start)

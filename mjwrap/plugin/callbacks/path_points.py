@@ -55,9 +55,9 @@ def frames_of(part, block, model, data):
 
 
 @jit
-def add_joint_forces(part, data, points):
+def add_joint_forces(part, data):
     """Add the generalised forces of the last evaluation to qfrc_passive."""
-    force = points.force
+    force = floats(part, A_FORCE, (read_int64(part + 8 * DOFS),))
     passive = field(part, QFRC, data, (force.shape[0],))
     for i in range(force.shape[0]):
         passive[i] += force[i]

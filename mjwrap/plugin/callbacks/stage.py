@@ -127,12 +127,15 @@ def stage(block, model, data):
     )
     at_points = block + read_int64(block + 8 * bk.A_POINTS)
     has_points = read_int64(at_points + 8 * GIVEN) != 0
-    points, frames = points_of(at_points, block), frames_of(at_points, block, model, data)
     pieces = block + read_int64(block + 8 * bk.A_PIECES)
     if idle and not transmits:
         update_pieces(pieces, model, data)
         if has_points:
-            place_sites(points, frames, poses_of(block, data).site_xpos)
+            place_sites(
+                points_of(at_points, block),
+                frames_of(at_points, block, model, data),
+                poses_of(block, data).site_xpos,
+            )
         clock[bk.ACTED] = 0.0
         _erase_paths(block)
         return
@@ -157,23 +160,24 @@ def stage(block, model, data):
     muscles, inputs, start = muscles_of(block), inputs_of(block, data), start_of(block)
     if has_points:
         failed = evaluate_with_points(
-            routes, muscles, poses, inputs, timing, TOLERANCE, paths, start, states, wrench, points, frames
-        )
+            routes, muscles, poses, inputs, timing, TOLERANCE, paths, start, states, wrench,
+            points_of(at_points, block), frames_of(at_points, block, model, data),
+        )  # fmt: skip
     else:
         failed = evaluate(routes, muscles, poses, inputs, timing, TOLERANCE, paths, start, states, wrench)
     if failed and since == 0.0:
         load_held(block, state)
         body_wrenches(routes, poses, paths, states.tension, wrench)
         if has_points:
-            write_point_forces(points, routes, paths, states.tension)
+            write_point_forces(points_of(at_points, block), routes, paths, states.tension)
     if has_points:
-        add_joint_forces(at_points, data, points)
+        add_joint_forces(at_points, data)
     lost = bool_array(block + read_int64(block + 8 * bk.A_LOST), (n,))
     for m in range(n):
         lost[m] = states.status[m] != lay.CONVERGED or (since > 0.0 and lost[m])
     _add_wrenches(block, data, state, wrench)
     if transmits:
-        transmit(part, block, model, data, since == 0.0, routes, poses, paths, points, states)
+        transmit(part, block, model, data, since == 0.0, routes, poses, paths, states)
     shown = block + read_int64(block + 8 * bk.A_PUBLISHED)
     if read_int64(shown + 8 * COUNT) != 0:
         publish_lengths(shown, block, model, data, since == 0.0, states.length, states.velocity)

@@ -13,6 +13,7 @@ from mjwrap.kernels.coupling.moments import write_transmissions
 from mjwrap.plugin.callbacks import block as bk
 from mjwrap.plugin.callbacks._cache import jit
 from mjwrap.plugin.callbacks.memory import int32_array, read_int32, read_int64
+from mjwrap.plugin.callbacks.path_points import points_of
 from mjwrap.plugin.callbacks.saving import field, floats, ints
 
 # sizes; COUNT: number of muscles whose actuators pull; if it is 0, all act by wrenches and the rest is not filled
@@ -41,7 +42,7 @@ def _indices(part, which, owner, shape):
 
 
 @jit
-def transmit(part, block, model, data, first_stage, routes, poses, paths, points, states):
+def transmit(part, block, model, data, first_stage, routes, poses, paths, states):
     """Write length, velocity and moment of the actuators; first_stage: also the sensors of the position stage."""
     n, dofs, outputs = states.length.shape[0], read_int64(part + 8 * DOFS), read_int64(part + 8 * OUTPUTS)
     entries, tendons = read_int64(part + 8 * MOMENTS), read_int64(part + 8 * TENDONS)
@@ -69,6 +70,7 @@ def transmit(part, block, model, data, first_stage, routes, poses, paths, points
         field(part, TEN_J, data, (read_int64(part + 8 * TENDON_MOMENTS),)),
     )
     row = floats(part, A_ROW, (dofs,))
+    points = points_of(block + read_int64(block + 8 * bk.A_POINTS), block)
     write_transmissions(
         routes, paths, tree, points.uses, points.slopes, states.length, states.velocity, targets, row
     )
