@@ -136,6 +136,8 @@ def _check_alike(model: mujoco.MjModel, pieces: list[Coupling]) -> None:
     """Raise `ModelError` unless all pieces have the follower and the leaders of the first."""
     first = pieces[0]
     for piece in pieces[1:]:
+        if piece.joint == first.joint and piece.leaders == first.leaders and piece.weights == first.weights:
+            continue
         here, there = _equality(model, piece.equalities[0]), _equality(model, first.equalities[0])
         if piece.joint != first.joint:
             mine, other = (name_of(model, OBJ.mjOBJ_JOINT, each.joint) for each in (piece, first))

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from mjwrap import validation
 from mjwrap.errors import StateError
 from mjwrap.mjcf import name_of
+from mjwrap.mjcf.coordinate_functions import CoordinateFunction, read_coordinate_functions
 from mjwrap.mjcf.couplings import CoupledJoints
-from mjwrap.osim.coordinate_functions import CoordinateFunction, read_coordinate_functions
 from mjwrap.system.pieces import PieceSwitch
 
 Array = NDArray[np.float64]

@@ -19,9 +19,9 @@ _JOINT = mujoco.mjtObj.mjOBJ_JOINT
 _SCALAR = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
-def independent_coordinates(model: mujoco.MjModel) -> list[str]:
+def independent_coordinates(model: mujoco.MjModel, couplings: CoupledJoints) -> list[str]:
     """Return the names of all hinges and slides that follow no other joint, in the model's order."""
-    leader = CoupledJoints(model).leader
+    leader = couplings.leader
     return [
         name_of(model, _JOINT, joint)
         for joint in range(model.njnt)
@@ -30,11 +30,14 @@ def independent_coordinates(model: mujoco.MjModel) -> list[str]:
 
 
 def moment_arms(
-    model: mujoco.MjModel, jacobian: Array, qpos: Array, coordinates: Iterable[str] | None
+    model: mujoco.MjModel,
+    couplings: CoupledJoints,
+    jacobian: Array,
+    qpos: Array,
+    coordinates: Iterable[str] | None,
 ) -> Array:
     """Return −J N (n, k) [m] at a pose qpos (nq,), from J = ∂l/∂q (n, nv); see `MuscleSystem.moment_arms`."""
-    couplings = CoupledJoints(model)
-    given = independent_coordinates(model) if coordinates is None else coordinates
+    given = independent_coordinates(model, couplings) if coordinates is None else coordinates
     dofs = _dofs(model, couplings, _listed(given))
     columns = np.searchsorted(couplings.independent, dofs)
     return -jacobian @ couplings.matrix(qpos)[:, columns]

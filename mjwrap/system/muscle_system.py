@@ -7,6 +7,7 @@ between MuJoCo's position and acceleration stages, and under RK4 in a control ca
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -18,6 +19,7 @@ from mjwrap.kernels import layout
 from mjwrap.kernels.coupling import wrenches
 from mjwrap.kernels.musculotendon import dynamics
 from mjwrap.kernels.musculotendon.dispatch import PATH_ACTUATOR
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.muscles.fibers import FiberState, fiber_state
 from mjwrap.system.callback import control_callback
@@ -126,16 +128,21 @@ class MuscleSystem(Evaluator):
 
         A joint that follows another by an equality of the model (`<equality><joint polycoef>`) is not independent.
         """
-        return independent_coordinates(self.model)
+        return independent_coordinates(self.model, self._couplings)
+
+    @cached_property
+    def _couplings(self) -> CoupledJoints:
+        return CoupledJoints(self.model)
 
     def moment_arms(self, data: mujoco.MjData, coordinates: Iterable[str] | None = None) -> Array:
         """Return moment arms (n, k) about independent joints at the present qpos [m], about a slide [-].
 
         Joints that follow a coordinate by an equality of the model move with it, so a column is the negative slope of
         the lengths along the coupled motion: −J N, with J = ∂l/∂q of `length_jacobian`, which is called first, and
-        N = ∂q/∂q_independent. The equalities are those that are active at the model's start; followers are taken where
-        qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the muscle's pull drives the coordinate up.
-        A muscle without a path has the moment arms of its last valid path, 0 before it had one.
+        N = ∂q/∂q_independent. The equalities are those that are active at the model's start, in the pieces that hold at
+        qpos; followers are taken where qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the
+        muscle's pull drives the coordinate up. A muscle without a path has the moment arms of its last valid path, 0
+        before it had one.
 
         Args:
             data: the state; only poses are used.
@@ -147,7 +154,8 @@ class MuscleSystem(Evaluator):
         Raises:
             GeometryError: no such joint, or it follows another one.
         """
-        return moment_arms(self.model, self.length_jacobian(data), data.qpos, coordinates)
+        jacobian = self.length_jacobian(data)
+        return moment_arms(self.model, self._couplings, jacobian, data.qpos, coordinates)
 
     def length_jacobian_rate(self, data: mujoco.MjData, direction: ArrayLike | None = None) -> Array:
         """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), by default along qvel.

@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf import name_of
+from mjwrap.mjcf.names import name_of
 from mjwrap.mjcf.tuple_names import COORDINATE
 
 OBJ = mujoco.mjtObj
