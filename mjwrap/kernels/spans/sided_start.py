@@ -17,7 +17,8 @@ from mjwrap.kernels.geometry.dispatch import segment_clearance
 from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.traits import branched, closed_form, one_sided, sided
 from mjwrap.kernels.spans.cold_start import wrap_in_turn
-from mjwrap.kernels.wraps.sides import point_of_side
+from mjwrap.kernels.spans.saved_solutions import surface_end
+from mjwrap.kernels.wraps.sides import all_sided, forget, point_of_side
 from mjwrap.kernels.wraps.single import wrap
 
 HINT, POS, ROT, SIZE = lay.HINT, lay.POS, lay.ROT, lay.SIZE
@@ -47,9 +48,17 @@ def _place_on_side(k, node, ends):
     )
 
 
-@deferred(types.int64)
+@deferred(types.boolean)
 def start_from_sides(lo, hi, ends, node):
-    """Wrap the obstacles of lo..hi, all COLD, on their sides; return the number of evaluations."""
+    """Forget the solutions of lo..hi if every side follows from the pose; return whether that is so.
+
+    A row of obstacles is then wrapped on its sides; a lone one stays COLD, and is wrapped by what follows.
+    """
+    if not all_sided(lo, hi, node):
+        return False
+    forget(lo, hi, node)
+    if hi == surface_end(lo, hi, node):
+        return True
     for k in range(lo, hi):
         if node[k, lay.TOUCH] > 0.0:
             continue
@@ -65,4 +74,5 @@ def start_from_sides(lo, hi, ends, node):
     for k in range(lo, hi):  # further rows of a surface that nothing has touched
         if node[k, lay.S_MODE] == lay.COLD:
             node[k, lay.S_MODE] = lay.FREE
-    return 1 + wrap_in_turn(lo, hi, ends, node, PASSES, False)
+    wrap_in_turn(lo, hi, ends, node, PASSES, False)
+    return True

@@ -27,7 +27,7 @@ from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.spans.sided_start import start_from_sides
-from mjwrap.kernels.wraps.sides import all_sided, any_sided, forget
+from mjwrap.kernels.wraps.sides import any_sided, forget
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
@@ -274,11 +274,8 @@ def solve_span(lo, hi, ends, node, tol, direct):
             return lay.CONVERGED, total, error, 0, 1
     # a side that holds at every pose: the path must not depend on the one before
     held = any_sided(lo, hi, node)
-    if held and all_sided(lo, hi, node):
+    if held and start_from_sides(lo, hi, ends, node):
         warm = False
-        forget(lo, hi, node)
-        if hi > surface_end(lo, hi, node):
-            start_from_sides(lo, hi, ends, node)
     # Newton's method writes the error of its first evaluation here; `_moved_far` reads it
     node[lo, W_START_ERROR] = -1.0
     status, total, error, iterations, evaluations = solve_active_set(lo, hi, ends, node, tol, direct)

@@ -47,7 +47,7 @@ from mjwrap.kernels.wraps.initial_guess import (
 )
 from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side, wrap_on_side
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, INSIDE, set_free
-from mjwrap.kernels.wraps.sides import middle_of_contact, on_allowed_half, point_of_side
+from mjwrap.kernels.wraps.sides import is_hopeless, middle_of_contact, on_allowed_half, point_of_side
 
 SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
@@ -299,6 +299,8 @@ def _search(
             guessed = True
             for i in range(lay.STATE):
                 memory[lay.STATE + i] = node[k, S_MODE + i]
+        if held and sided_path and is_hopeless(k, ends, node, best):
+            continue
         good, total = polish_from_low_ends(k, ends, node, high_a, high_b)
         if not good or not _on_branch(k, node, branch, before):
             continue

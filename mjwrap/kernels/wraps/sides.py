@@ -26,6 +26,9 @@ from mjwrap.kernels.geometry.traits import one_sided, sided
 HINT, POS, SIZE, S_MODE, S_ARC = lay.HINT, lay.POS, lay.SIZE, lay.S_MODE, lay.S_ARC
 
 LEVEL = 1e-9  # a place that is less far on the other half, in the surface's size, is in the middle
+# a guess whose middle is so deep on the other half, in sizes, or whose detour is longer by such a share, is given up
+HOPELESS_DEPTH = 0.3
+HOPELESS_DETOUR = 0.4
 ON_AXIS = 1e-9  # a direction whose part across the axis is a smaller share of the size gives no side
 
 
@@ -80,6 +83,31 @@ def middle_of_contact(k, ends, node):
     node[k, S_ARC] = arc
     geodesic(k, node, ends[0], ends[1], ends[2])
     return x, y, z
+
+
+@jit
+def is_hopeless(k, ends, node, best):
+    """Return whether a guess of row k's contact cannot lead to a path on the allowed half shorter than `best` [m].
+
+    A path that it could lead to differs little from it: the guess nearest to that path does not count as hopeless.
+    """
+    arc = node[k, S_ARC]
+    node[k, S_ARC] = 0.5 * arc
+    geodesic(k, node, ends[0], ends[1], ends[2])
+    x, y, z = contact_in_frame(k, lay.W_Q, ends[:3], node)
+    node[k, S_ARC] = arc
+    hx, hy, hz = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
+    depth = x * hx + y * hy + z * hz
+    if depth < -HOPELESS_DEPTH * node[k, SIZE] * math.sqrt(hx * hx + hy * hy + hz * hz):
+        return True
+    geodesic(k, node, ends[0], ends[1], ends[2])
+    p, q = lay.W_P, lay.W_Q
+    px, py, pz = node[k, p] - ends[3], node[k, p + 1] - ends[4], node[k, p + 2] - ends[5]
+    qx, qy, qz = node[k, q] - ends[6], node[k, q + 1] - ends[7], node[k, q + 2] - ends[8]
+    total = math.sqrt(px * px + py * py + pz * pz) + arc + math.sqrt(qx * qx + qy * qy + qz * qz)
+    dx, dy, dz = ends[6] - ends[3], ends[7] - ends[4], ends[8] - ends[5]
+    straight = math.sqrt(dx * dx + dy * dy + dz * dz)
+    return total - straight > (1.0 + HOPELESS_DETOUR) * (best - straight)
 
 
 @jit
