@@ -95,7 +95,7 @@ def _closed(model: OsimModel, values: dict[str, float], movable: list[str]) -> d
             slopes = np.array(
                 [(gap_at(x + step) - gap) / DIFFERENCE for step in DIFFERENCE * np.eye(len(x))]
             ).T
-        step = np.linalg.lstsq(slopes, -gap, rcond=1e-8)[0]
+        step: Array = np.linalg.lstsq(slopes, -gap, rcond=1e-8)[0].astype(np.float64)
         step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
         x = x + step
         before, gap = gap, gap_at(x)

@@ -80,7 +80,7 @@ class SiteWriter:
             driver = self._driver_of({names[k] for k in moves})
             if driver is None:
                 self._report.add("MovingPathPoint", point.name or site, APPROXIMATED,
-                                 f"its axis {'xyz'[axis]} stays as at the default pose: no one joint moves it")  # fmt: skip
+                                 f"its axis {'xyz'[axis]} stays as by default: no single joint moves it")  # fmt: skip
                 continue
             joint, inner = driver
             fixed = float(frame.position[axis]) + sum(
