@@ -48,7 +48,9 @@ def test_wrapped_paths_have_nearly_opensims_length(name):
     assert max(found)[0] < CLASSIC[name], max(found)
 
 
-@pytest.mark.parametrize("name", ["gait10dof18musc", "leg6dof9musc", "arm26", "CoupledCoordinatesMPPsMomentArmTest"])
+@pytest.mark.parametrize(
+    "name", ["gait10dof18musc", "leg6dof9musc", "arm26", "CoupledCoordinatesMPPsMomentArmTest"]
+)
 def test_moment_arms_are_derivatives_of_the_length(name):
     """Moving points, conditional points and couplings included: the derivative is taken along the couplings."""
     model, data = compiled(name), None
@@ -93,7 +95,10 @@ def routes_at(model: mujoco.MjModel, data: mujoco.MjData) -> list[bool]:
     """Return for every range of a conditional point whether its joint is inside."""
     held = []
     for j in range(len(model.tuple_objtype) - 1):
-        if model.tuple_objtype[j] == mujoco.mjtObj.mjOBJ_JOINT and model.tuple_objtype[j + 1] == mujoco.mjtObj.mjOBJ_NUMERIC:
+        if (
+            model.tuple_objtype[j] == mujoco.mjtObj.mjOBJ_JOINT
+            and model.tuple_objtype[j + 1] == mujoco.mjtObj.mjOBJ_NUMERIC
+        ):
             numeric = model.tuple_objid[j + 1]
             if "active_range" in model.numeric(numeric).name:
                 low, high = model.numeric_data[model.numeric_adr[numeric] :][:2]
@@ -114,4 +119,6 @@ def test_every_muscle_keeps_its_name_and_drives_an_actuator():
     muscles = mw.MuscleSystem(model)
     frozen = json.loads((FROZEN / "lengths_gait2392_millard.json").read_text())
     assert sorted(muscles.names) == sorted(frozen["paths"])
-    assert {entry.outcome for entry in imported("gait2392_millard").report.entries if "Muscle" in entry.kind} == {"exact"}
+    assert {
+        entry.outcome for entry in imported("gait2392_millard").report.entries if "Muscle" in entry.kind
+    } == {"exact"}

@@ -44,7 +44,7 @@ def contact_geometry(surface: mw.Sphere, place: np.ndarray, rotation: np.ndarray
 
 
 def scholz_length(points: list[tuple[str, object]]) -> float:
-    """Return the length of OpenSim's geodesic path; NaN where it throws. points: via points, and obstacles with hint."""
+    """Return the length of OpenSim's geodesic path; NaN where it throws. points: via points, obstacles with hints."""
     model = opensim.Model()
     ground = model.getGround()
     path = opensim.Scholz2015GeometryPath()

@@ -96,7 +96,9 @@ def import_osim(
 def write_paths(document: Document, model: OsimModel, report: Report, skeleton: Skeleton, poses: int) -> None:
     """Write all wrap objects and all forces along paths."""
     geoms, sites = UniqueNames(document, "geom"), SiteWriter(document, report, skeleton.drivers)
-    pulls = [force for force in model.forces if isinstance(force, Muscle | Ligament | PathSpring | PathActuator)]
+    pulls = [
+        force for force in model.forces if isinstance(force, Muscle | Ligament | PathSpring | PathActuator)
+    ]
     wraps = {wrap.name: write_wrap(document, report, wrap, geoms, sites) for wrap in model.wraps}
     written = {name: wrap for name, wrap in wraps.items() if wrap is not None}
     used = any(pull.path.wraps for pull in pulls)

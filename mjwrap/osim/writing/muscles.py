@@ -66,9 +66,7 @@ class MuscleWriter:
         outcome = APPROXIMATED if law.remarks else EXACT
         self._report.add(kind, pull.name, outcome, "; ".join([f"law {law.name}", *law.remarks]))
 
-    def _driven(
-        self, name: str, route: Route, law: WrittenLaw, controls: tuple[float, float]
-    ) -> None:
+    def _driven(self, name: str, route: Route, law: WrittenLaw, controls: tuple[float, float]) -> None:
         """Write a muscle that an actuator drives, with a tendon over its sites for MuJoCo's sake."""
         actuator = self._actuators.new(name)
         tendon = self._tendons.new(f"{actuator}_tendon")

@@ -25,9 +25,7 @@ def shifted(function: Piecewise, piece: int, origin: float, width: int) -> np.nd
 
 def weighted_sum(functions: Sequence[Piecewise], weights: Sequence[float], offset: float) -> Piecewise:
     """Return offset + the sum of weights times functions of the same variable."""
-    parts = [
-        (function, weight) for function, weight in zip(functions, weights, strict=True) if weight != 0.0
-    ]
+    parts = [(function, weight) for function, weight in zip(functions, weights, strict=True) if weight != 0.0]
     if len(parts) == 1 and parts[0][1] == 1.0:
         only = parts[0][0]
         if offset == 0.0:

@@ -32,11 +32,11 @@ class RouteWriter:
 
     def route(self, owner: str, path: Path) -> Route | None:
         """Write the points of a path; None, with an entry in the report, where it cannot be a path of mjwrap's."""
-        ends = path.points[:1] + path.points[-1:]
-        if len(path.points) < 2 or any(point.condition is not None for point in ends):
-            self._report.add(path.kind, owner, LEFT_OUT, "a path needs two ends that always belong to it")
+        count = len(path.points)
+        if count < 2:
+            self._report.add(path.kind, owner, LEFT_OUT, "a path needs two points")
             return None
-        stops = [self._sites.stop(owner, point) for point in path.points]
+        stops = [self._sites.stop(owner, point, k in (0, count - 1)) for k, point in enumerate(path.points)]
         seats = self._seats(owner, path)
         elements: Elements = []
         for gap, stop in enumerate(stops):
@@ -51,10 +51,11 @@ class RouteWriter:
         kept: list[Seat] = []
         for wrap in path.wraps:
             if wrap.object not in self._wraps:
-                self._report.add("PathWrap", f"{owner}/{wrap.object}", LEFT_OUT, "its wrap object is left out")
+                self._report.add(
+                    "PathWrap", f"{owner}/{wrap.object}", LEFT_OUT, "its wrap object is left out"
+                )
         for seat in seat_wraps(path, self._wraps, self._poses):
             name = f"{owner}/{seat.wrap}"
-            points = path.points
             if not self._wraps[seat.wrap].wrap.active:
                 self._report.add("PathWrap", name, LEFT_OUT, "its wrap object is not active in the file")
                 continue

@@ -30,7 +30,7 @@ DIFFERENCE = 1e-6  # [rad or m] of these derivatives
 
 
 def sampled_poses(model: OsimModel, count: int, seed: int = 0) -> list[Sample]:
-    """Return the default pose and random ones, `count` in all; constraints between bodies are met where that is possible.
+    """Return the default pose and random ones, `count` in all; constraints between bodies are met where they can be.
 
     Coordinates without a small range stay within 1.5 rad or 0.3 m of their default values; locked ones keep these.
     """
@@ -92,8 +92,10 @@ def _closed(model: OsimModel, values: dict[str, float], movable: list[str]) -> d
         if np.abs(gap).max() < CLOSED:
             return values | dict(zip(movable, map(float, x), strict=True))
         if k % FRESH == 0:
-            slopes = np.array([(gap_at(x + step) - gap) / DIFFERENCE for step in DIFFERENCE * np.eye(len(x))]).T
-        step = np.linalg.lstsq(slopes, -gap, rcond=1e-8)[0]
+            slopes = np.array(
+                [(gap_at(x + step) - gap) / DIFFERENCE for step in DIFFERENCE * np.eye(len(x))]
+            ).T
+        step: Array = np.linalg.lstsq(slopes, -gap, rcond=1e-8)[0].astype(np.float64)
         step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
         x = x + step
         before, gap = gap, gap_at(x)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -60,7 +61,7 @@ def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, sample: Sample) ->
     }
     return [
         act_between(written, first, last, places[first], places[last])
-        for first, last in zip(there, there[1:], strict=False)
+        for first, last in itertools.pairwise(there)
     ]
 
 
@@ -90,7 +91,9 @@ def act_between(written: WrittenWrap, first: int, last: int, start: Array, end: 
         return nothing._replace(touched=hit and not solution.converged)
     straight = end - start
     along = float(straight @ (0.5 * (contact.P + contact.Q) - start) / (straight @ straight))
-    beyond = wrap.kind == "WrapCylinder" and min(abs(contact.P[2]), abs(contact.Q[2])) > 0.5 * wrap.dimensions[1]
+    beyond = (
+        wrap.kind == "WrapCylinder" and min(abs(contact.P[2]), abs(contact.Q[2])) > 0.5 * wrap.dimensions[1]
+    )
     added = solution.length - float(np.linalg.norm(straight))
     return Act(first, last, hit, not beyond, added, along, inside, beyond, (contact.P, contact.Q))
 

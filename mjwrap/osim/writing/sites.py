@@ -45,8 +45,8 @@ class SiteWriter:
         self._document.add(self._document.bodies[body], "site", name=unique, pos=position, group=group)
         return unique
 
-    def stop(self, owner: str, point: PathPoint) -> Stop:
-        """Write a point of a muscle's path."""
+    def stop(self, owner: str, point: PathPoint, end: bool = False) -> Stop:
+        """Write a point of a muscle's path; the ends of a path always belong to it."""
         plain = plain_name(point.name)
         name = plain if owner in plain else f"{owner}_{plain}" if plain else f"{owner}_point"
         if point.moving is None:
@@ -56,17 +56,18 @@ class SiteWriter:
         else:
             site = self._moving_site(owner, name, point, point.moving)
         elements: Elements = [{"objtype": "site", "objname": site}]
-        if point.condition is not None:
+        if point.condition is not None and not end:
             more = self._condition(owner, site, point.condition)
             elements += more
             return Stop(site, elements, not more)
+        if point.condition is not None:
+            self._report.add("ConditionalPathPoint", site, APPROXIMATED,
+                             f"it always belongs to the path of {owner}, because it is its end")  # fmt: skip
         return Stop(site, elements, True)
 
     def _moving_site(self, owner: str, name: str, point: PathPoint, moving: MovingLocation) -> str:
         names, functions = moving.coordinates, moving.functions
-        here = np.array(
-            [float(f(self._defaults.get(c, 0.0))) for c, f in zip(names, functions, strict=True)]
-        )
+        here = np.array([float(f(self._defaults.get(c, 0.0))) for c, f in zip(names, functions, strict=True)])
         frame = point.frame
         site = self.site(frame.body, name, frame.position + frame.rotation @ here)
         elements: Elements = []
@@ -79,7 +80,7 @@ class SiteWriter:
             driver = self._driver_of({names[k] for k in moves})
             if driver is None:
                 self._report.add("MovingPathPoint", point.name or site, APPROXIMATED,
-                                 f"its axis {'xyz'[axis]} stays at the default pose: no single joint moves it")  # fmt: skip
+                                 f"its axis {'xyz'[axis]} stays as by default: no single joint moves it")  # fmt: skip
                 continue
             joint, inner = driver
             fixed = float(frame.position[axis]) + sum(
@@ -116,11 +117,7 @@ class SiteWriter:
     def _condition(self, owner: str, site: str, condition: Condition) -> Elements:
         driver = self._drivers(condition.coordinate)
         low, high = condition.range
-        held = (
-            (low, high)
-            if driver is None or driver[1] is None
-            else preimage(driver[1], low, high)
-        )
+        held = (low, high) if driver is None or driver[1] is None else preimage(driver[1], low, high)
         if driver is None or held is None:
             inside = low <= self._defaults.get(condition.coordinate, 0.0) <= high
             self._report.add("ConditionalPathPoint", site, APPROXIMATED,

@@ -33,7 +33,9 @@ def in_order(
         wanted = votes[b.wrap, a.wrap] - votes[a.wrap, b.wrap]
         return wanted or a.along.get(gap, 0.5) - b.along.get(gap, 0.5)
 
-    ordered = sorted(here, key=functools.cmp_to_key(lambda a, b: (compare(a, b) > 0.0) - (compare(a, b) < 0.0)))
+    ordered = sorted(
+        here, key=functools.cmp_to_key(lambda a, b: (compare(a, b) > 0.0) - (compare(a, b) < 0.0))
+    )
     for k, seat in enumerate(ordered):
         wrong = sum(votes[later.wrap, seat.wrap] for later in ordered[k + 1 :])
         seat.turned = max(seat.turned, wrong / max(len(samples), 1))
@@ -54,10 +56,8 @@ def _met(
         written = wraps[seat.wrap]
         frame = frame_pose(sample.bodies, written.wrap.frame)
 
-        def inner(point: Array) -> Array:
-            return frame.rotation.T @ (point - frame.position)
-
-        acts = [act_between(written, k, k + 1, inner(a), inner(b)) for k, (a, b) in enumerate(pieces)]
+        ends = [[frame.rotation.T @ (end - frame.position) for end in piece] for piece in pieces]
+        acts = [act_between(written, k, k + 1, a, b) for k, (a, b) in enumerate(ends)]
         best = best_act(acts)
         if best is None or best.contact is None:
             continue

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from mjwrap.osim.description.paths import WrapObject
@@ -18,11 +20,15 @@ LARGEST_DRAWN = 10.0  # [m]: some files have cylinders of kilometres
 SIDE = 2  # mark (prm) of a site: the path passes on its side of the geom before it, at every pose
 
 
+@dataclass(frozen=True)
 class WrittenWrap:
-    """A wrap object as written: its geom, its surface for `solve_path`, and the site of its side."""
+    """A wrap object as written: its surface for `solve_path`, its geom, the site of its side, and its numeric."""
 
-    def __init__(self, wrap: WrapObject, surface: Surface, geom: str, side: str | None, numeric: str | None):
-        self.wrap, self.surface, self.geom, self.side, self.numeric = wrap, surface, geom, side, numeric
+    wrap: WrapObject
+    surface: Surface
+    geom: str
+    side: str | None = None
+    numeric: str | None = None
 
     @property
     def elements(self) -> list[dict[str, object]]:
@@ -97,13 +103,10 @@ def write_wrap(
         text += f", the path passes on its side {wrap.quadrant.strip()}"
     elif point is not None:
         outcome = APPROXIMATED
-        text += (
-            f"; its side {wrap.quadrant.strip()} is not kept: "
-            + {
-                "WrapSphere": "a string slides off a sphere to the short way round",
-                "WrapTorus": "a string on a torus lies where it is pushed",
-            }.get(wrap.kind, "both ways round the axis have it")
-        )
+        text += f"; its side {wrap.quadrant.strip()} is not kept: " + {
+            "WrapSphere": "a string slides off a sphere to the short way round",
+            "WrapTorus": "a string on a torus lies where it is pushed",
+        }.get(wrap.kind, "both ways round the axis have it")
     if wrap.kind == "WrapTorus":
         outcome = APPROXIMATED if outcome is APPROXIMATED else EXACT
         text += ", wrapped as a torus (OpenSim wraps a cylinder in its place)"
