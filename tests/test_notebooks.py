@@ -161,7 +161,9 @@ def test_muscles_are_a_sequence(elbow: tuple[mw.MuscleSystem, mujoco.MjData]) ->
     for wrong in (7, -8):
         with pytest.raises(mw.GeometryError, match="does not exist; there are 7"):
             muscles[wrong]
-    with pytest.raises(mw.GeometryError, match=r"no muscle 'BRa'; did you mean BRD or BRA.*muscles: TRIlong"):
+    with pytest.raises(
+        mw.GeometryError, match=r"no muscle 'BRa' .did you mean 'BRA' or 'BRD'.*muscles: TRIlong"
+    ):
         muscles["BRa"]
 
 

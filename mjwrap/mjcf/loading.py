@@ -13,8 +13,9 @@ import mujoco
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.file_kinds import OPENSIM, foreign
 from mjwrap.mjcf.missing_names import with_candidates
-from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, nearest, own_file, own_models
+from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, own_file, own_models
 from mjwrap.mjcf.names import listed
+from mjwrap.text import nearest
 
 
 def is_binary(path: str | os.PathLike[str]) -> bool:

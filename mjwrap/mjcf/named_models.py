@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import importlib.metadata
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ import mujoco
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed
+from mjwrap.text import nearest
 
 OWN, MYO = "mjwrap:", "myo_sim:"
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -79,13 +78,6 @@ def myo_model(source: str) -> mujoco.MjModel:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise _broken(source, error) from None
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return " (did you mean ...?)" with the known names that resemble a name, the best first, or an empty string."""
-    by_lower = {each.lower(): each for each in known}
-    close = [by_lower[each] for each in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.6)]
-    return f" (did you mean {' or '.join(repr(each) for each in close)}?)" if close else ""
 
 
 def _broken(source: str, error: Exception) -> ModelError:

@@ -21,7 +21,7 @@ from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.tendon_curves import native_tendons, tendon_rows
 from mjwrap.system import CableSystem, is_cable
-from mjwrap.text import counted_paths
+from mjwrap.text import counted_paths, nearest
 
 Array = NDArray[np.float64]
 _SINGLE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -96,7 +96,9 @@ class JointCurves:
 
     def __getitem__(self, quantity: str) -> Array:
         if quantity not in self.values:
-            raise ModelError(f"no quantity '{quantity}'; there are: {', '.join(self.values)}")
+            raise ModelError(
+                f"no quantity '{quantity}'{nearest(str(quantity), self.values)}; there are: {', '.join(self.values)}"
+            )
         return self.values[quantity]
 
 
@@ -203,7 +205,7 @@ def _joint(model: mujoco.MjModel, name: str) -> int:
         if int(model.jnt_type[j]) in _SINGLE
     }
     if name not in single:
-        raise ModelError(f"no hinge or slide '{name}'; there are: {listed(single)}")
+        raise ModelError(f"no hinge or slide '{name}'{nearest(name, single)}; there are: {listed(single)}")
     return single[name]
 
 
@@ -265,6 +267,6 @@ def _chosen(
         fit = [known.index(pattern)] if pattern in known else []
         fit = fit or [i for i, name in enumerate(known) if fnmatch.fnmatchcase(name, pattern)]
         if not fit:
-            raise ModelError(f"no muscle '{pattern}'; muscles: {listed(known)}")
+            raise ModelError(f"no muscle '{pattern}'{nearest(pattern, known)}; muscles: {listed(known)}")
         found += [i for i in fit if i not in found]
     return found

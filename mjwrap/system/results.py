@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import operator
 from collections.abc import Iterator
 from typing import Any, SupportsIndex
@@ -25,6 +24,7 @@ from mjwrap.paths import Status
 from mjwrap.system.history import History
 from mjwrap.system.muscle_view import MuscleView, system_html, system_text
 from mjwrap.system.state import Evaluation
+from mjwrap.text import nearest
 
 Array = NDArray[np.float64]
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
@@ -171,9 +171,7 @@ class Results:
                 f"no muscle of the name {validation.described(name)}; muscles: {listed(names)}"
             )
         if name not in names:
-            near = difflib.get_close_matches(name, names, n=3)
-            meant = f"did you mean {' or '.join(near)}? " if near else ""
-            raise GeometryError(f"no muscle '{name}'; {meant}muscles: {listed(names)}")
+            raise GeometryError(f"no muscle '{name}'{nearest(name, names)}; muscles: {listed(names)}")
         return names.index(name)
 
     def __getitem__(self, muscle: str | SupportsIndex) -> MuscleView:
