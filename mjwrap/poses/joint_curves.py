@@ -17,6 +17,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.model.takeover import Takeover
+from mjwrap.poses.angles import check_range
 from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.tendon_curves import native_tendons, tendon_rows
@@ -141,7 +142,8 @@ def curves(
         The curves.
 
     Raises:
-        ModelError: there is no such joint or muscle, the joint moves no muscle, or an argument is out of its range.
+        ModelError: there is no such joint or muscle, the joint moves no muscle, an argument is out of its range, or
+            only degrees can explain the span.
     """
     validation.of_type(model, "MjModel", "model", ModelError)
     validation.instance(joint, str, "joint", ModelError, "the name of a hinge or slide")
@@ -149,6 +151,8 @@ def curves(
     samples = validation.whole(samples, 2, "samples", ModelError)
     _check(model, muscles, span, qpos, activation)
     validation.flag(native, "native", ModelError)
+    if span is not None:
+        check_range(model, index, *span)
     with Takeover(model).original_limits():
         model = copy.copy(model)  # its actuators are disabled below
     system = CableSystem(model, side_rule=side_rule)

@@ -16,15 +16,10 @@ from numpy.typing import ArrayLike
 from mjwrap.errors import MjwrapError, ModelError, SignalError, TableError
 from mjwrap.files import Table
 from mjwrap.mjcf import name_of
+from mjwrap.poses.angles import BEYOND, TURNS, Angle
 
-BEYOND = math.pi  # [rad] no position of a hinge with a range can be meant that is further outside
-TURNS = 4.0 * math.pi  # [rad] a hinge without a range seldom turns further
 _DEGREES = re.compile(r"(deg|°)$")
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-
-
-class Angle(float):
-    """A position [rad] that was given in degrees, so it fits hinges only."""
 
 
 def position(text: str) -> float:
@@ -90,29 +85,6 @@ def check_position(
         warnings.warn(
             f"{entry}: {value:g} rad are {abs(value) / (2.0 * math.pi):.3g} turns of joint '{name}'{instead}",
             stacklevel=3,
-        )
-
-
-def check_range(model: mujoco.MjModel, joint: int, low: float, high: float) -> None:
-    """Raise `ModelError` for a range [rad] of a hinge that only degrees can explain.
-
-    That is one that goes half a turn or more beyond the model's own range, or more than two turns without one.
-    """
-    name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
-    entry = f"range of joint '{name}'"
-    for end in (low, high):
-        if isinstance(end, Angle) and int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE):
-            raise ModelError(f"{entry}: it is a slide: give its range in m, without deg")
-    if int(model.jnt_type[joint]) != _HINGE or isinstance(low, Angle) or isinstance(high, Angle):
-        return
-    own = [float(x) for x in model.jnt_range[joint]]
-    limited = bool(model.jnt_limited[joint])
-    if (limited and max(own[0] - low, high - own[1]) > BEYOND) or (not limited and high - low > TURNS):
-        turns = (high - low) / (2.0 * math.pi)
-        beside = f", and the model's range is {own[0]:.4g} to {own[1]:.4g} rad" if limited else ""
-        raise ModelError(
-            f"{entry}: {low:g} to {high:g} rad are {turns:.3g} turns{beside}; if degrees are meant, write "
-            f"{name}={low:g}deg,{high:g}deg"
         )
 
 

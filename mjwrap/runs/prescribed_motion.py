@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import SignalError
 from mjwrap.files import SUFFIXES, read_table
-from mjwrap.runs.angles import Angle, check_column, check_position, pattern_in_radians
+from mjwrap.poses.angles import Angle
+from mjwrap.runs.angles import check_column, check_position, pattern_in_radians
 from mjwrap.runs.models import find_joint, single_joints
 from mjwrap.runs.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
 
@@ -128,7 +129,7 @@ def _smooth(model: mujoco.MjModel, joint: int, name: str, pattern: str) -> Smoot
 
 def _extremes(signal: Sine) -> tuple[float, float]:
     reach = abs(signal.amplitude)
-    return signal.offset - reach, signal.offset + reach
+    return signal.offset + reach, signal.offset - reach
 
 
 def check_free(model: mujoco.MjModel, joints: Sequence[int], positions: Mapping[str, float]) -> None:
