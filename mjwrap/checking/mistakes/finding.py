@@ -37,6 +37,8 @@ class Mistake(enum.StrEnum):
     KEYFRAME = "keyframe in degrees"
     PARAMETER = "length of fibre or tendon"
     UNITS = "units"
+    PUSHES = "cable pushes"
+    ACTUATION = "actuation off"
 
 
 @dataclass(frozen=True)

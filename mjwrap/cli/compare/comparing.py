@@ -136,7 +136,7 @@ def compare(settings: CompareSettings) -> int:
             seed=settings.seed,
             side_rule=settings.side_rule,
         )
-        tell_motion(report.say, motion, changed, settings.excitation)
+        tell_motion(report.say, motion, changed, settings.excitation, found.unlike)
     if plot is not None:
         from mjwrap.cli.compare.plot import plot_comparison
 

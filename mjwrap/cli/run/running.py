@@ -140,6 +140,8 @@ def tell(
         report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
+    if sentence := simulation.pushes.told():
+        report.say(sentence)
     report.say(ended(simulation))
     if sentence := undriven(simulation):
         report.say(sentence)
@@ -167,6 +169,7 @@ def facts(
         "simulated": float(engine.data.time),
         "positions": positions(simulation),
         "undriven": undriven(simulation),
+        "pushes": simulation.pushes.found(),
         "wall": spent.simulation,
         "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,
