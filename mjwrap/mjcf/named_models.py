@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ from mjwrap.mjcf.names import listed
 from mjwrap.text import nearest
 
 OWN, MYO = "mjwrap:", "myo_sim:"
+NOISE = "Attaching a spec with an empty prefix"  # matters only when such a spec is saved
 _PACKAGE = Path(__file__).resolve().parents[1]
 # a wheel has the models inside the package (pyproject.toml, force-include), a clone beside it
 _FOLDERS = (_PACKAGE / "models", _PACKAGE.parent / "models")
@@ -66,7 +70,8 @@ def myo_spec(source: str) -> mujoco.MjSpec:
     try:
         # 0.2.3 and older have no postures, and the oldest no build_kwargs
         postures = hasattr(package, "list_postures") and package.list_postures(name)
-        return package.load_spec(name, **({"build_kwargs": {"postures": True}} if postures else {}))
+        with quiet_prefixes(source):
+            return package.load_spec(name, **({"build_kwargs": {"postures": True}} if postures else {}))
     except Exception as error:
         raise _broken(source, error) from None
 
@@ -75,9 +80,34 @@ def myo_model(source: str) -> mujoco.MjModel:
     """Return the compiled model of "myo_sim:NAME"; errors as of `myo_spec`."""
     spec = myo_spec(source)
     try:
-        return spec.compile()
+        with quiet_prefixes(source):
+            return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise _broken(source, error) from None
+
+
+@contextmanager
+def quiet_prefixes(source: object) -> Iterator[None]:
+    """Do not show MuJoCo's warning of an empty prefix inside a with block, if the source is "myo_sim:NAME".
+
+    It comes whenever such a spec compiles, because of how the package composes its models, and says nothing of use.
+    """
+    if not (isinstance(source, str) and source.startswith(MYO)):
+        yield
+        return
+    before = mujoco.get_mju_user_warning()
+
+    def show(text: str) -> None:
+        if not text.startswith(NOISE):
+            (before or warnings.warn)(text)
+
+    mujoco.set_mju_user_warning(show)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=NOISE)
+            yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _broken(source: str, error: Exception) -> ModelError:
