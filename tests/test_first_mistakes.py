@@ -228,6 +228,10 @@ CASES: dict[str, Case] = {
     "states in degrees that do not say so": Case(
         [], ("replay", "{table}", "--model", "{model}", "--out", "{out}"), 2, ["column 'elbow'", "inDegrees=yes"]
     ),
+    "table of a few degrees that does not say so": Case(
+        [], (*RUN, "--prescribe", "{few}"), 0,
+        ["column 'elbow' reaches 4 rad at time 1 s", "outside the range of joint 'elbow'", "inDegrees=yes"],
+    ),
     "many turns of a wheel": Case(
         [], (*RUN, "--prescribe", "axle=90"), 0, ["warning: 'axle=90'", "14.3 turns of joint 'axle'", "write 90deg"]
     ),
@@ -242,7 +246,11 @@ def command_of(case: Case, folder: Path) -> list[str]:
     model, table = folder / "arm.xml", folder / "ik.mot"
     model.write_text(edited(*case.edits))
     mw.write_table(table, mw.Table(np.array([0.0, 1.0]), ("elbow",), np.array([[0.0], [90.0]])))
-    name, *rest = (w.format(model=model, table=table, out=folder / "o.csv") for w in case.command)
+    few = folder / "few.mot"
+    if "{few}" in case.command:
+        mw.write_table(few, mw.Table(np.array([0.0, 1.0]), ("elbow",), np.array([[0.0], [4.0]])))
+    given = {"model": model, "table": table, "few": few, "out": folder / "o.csv"}
+    name, *rest = (w.format(**given) for w in case.command)
     needs_model = name != "replay"
     source = CASE2 if any("cylinder_y" in word for word in rest) else str(model)
     return [name, *[source] * needs_model, *rest]

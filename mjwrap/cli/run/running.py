@@ -129,6 +129,8 @@ def tell(
     wall = spent.simulation
     rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
+    for remark in simulation.prescribed.remarks:
+        report.say(remark)
     if not muscles.n and not muscles.native:
         report.say("the model declares no muscle for mjwrap; MuJoCo alone simulated it")
     if muscles.native:
