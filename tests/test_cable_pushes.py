@@ -94,3 +94,18 @@ def test_compare_says_which_cables_have_another_route_in_mujoco(capsys: pytest.C
     told = run_here("compare", capsys, FINGER, *words).out
     assert "has another route, or no tendon, for fdp, extensor: the motions must differ" in told
     assert "must differ" not in run_here("compare", capsys, ELBOW, *words).out
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_level_above_the_range_of_a_servo_is_not_called_percents(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    told = run_here(
+        "run", capsys, FINGER, "--duration", "0.01", "--excitation", "fdp=constant:1", "fds=constant:50"
+    ).err
+    servo, motor = (line for line in told.splitlines() if "largest control" in line)
+    assert "'fdp' reaches 1, which acts like 0.14" in servo
+    assert "units of its actuator" in servo
+    assert "percents" not in servo
+    assert "'fds' reaches 50" in motor
+    assert "if these are percents, divide them by 100" in motor

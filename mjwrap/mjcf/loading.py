@@ -81,7 +81,13 @@ def _source(path: object) -> str:
     """Return the argument of a loader as text; `ModelError` if it is not the name of a file or model."""
     if isinstance(path, str | os.PathLike):
         text = os.fspath(path)
-        if isinstance(text, str):
+        if isinstance(text, str) and text.lstrip().startswith("<"):
+            raise ModelError(
+                "path must be the name of a file, not the text of a model: write "
+                "mw.install(mujoco.MjSpec.from_string(text)), or for a MuscleSystem "
+                "mujoco.MjModel.from_xml_string(text)"
+            )
+        if isinstance(text, str) and text:
             return text
     given = f"an {type(path).__name__}" if isinstance(path, mujoco.MjModel | mujoco.MjSpec) else repr(path)
     remedy = {
