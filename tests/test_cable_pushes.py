@@ -89,11 +89,16 @@ def test_a_run_gives_the_range_that_a_joint_has_left(capsys: pytest.CaptureFixtu
     assert "outside" not in run_here("run", capsys, FINGER, "--duration", "0.01").out
 
 
-def test_compare_says_which_cables_have_another_route_in_mujoco(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ("--bases", "1", "--samples", "3", "--duration", "0.01")
+def test_compare_says_which_cables_have_another_route_in_mujoco(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    words = ("--bases", "1", "--samples", "3", "--duration", "0.01", "--report", page)
     told = run_here("compare", capsys, FINGER, *words).out
     assert "has another route, or no tendon, for fdp, extensor: the motions must differ" in told
+    assert "no tendon, for fdp, extensor: the motions must differ" in page.read_text()
     assert "must differ" not in run_here("compare", capsys, ELBOW, *words).out
+    assert "must differ" not in page.read_text()
 
 
 @pytest.mark.filterwarnings("default")

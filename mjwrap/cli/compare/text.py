@@ -131,6 +131,11 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
     say("\n".join(aligned(rows, (0, 1, 2))))
 
 
+def unlike_routes(names: Sequence[str]) -> str:
+    """Return a remark on muscles that MuJoCo pulls along another route, or not at all."""
+    return f"MuJoCo's simulation has another route, or no tendon, for {', '.join(names)}: the motions must differ"
+
+
 def tell_motion(
     say: Say, motion: MotionDifference, changed: list[str], entries: Sequence[str], unlike: Sequence[str]
 ) -> None:
@@ -143,9 +148,7 @@ def tell_motion(
         those = counted(len(changed), "muscle")
         say(f"  {those} with another law: MuJoCo's curves in both (--law declared: their own law)")
     if unlike:
-        say(
-            f"  MuJoCo's simulation has another route, or no tendon, for {', '.join(unlike)}: the motions must differ"
-        )
+        say(f"  {unlike_routes(unlike)}")
     dof, gap, when = motion.worst()
     last, final = motion.final()
     if dof:
