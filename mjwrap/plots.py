@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.errors import MissingPackageError
+from mjwrap.errors import GeometryError, MissingPackageError
 
 Array = NDArray[np.float64]
 ROWS = 26  # of a legend
@@ -34,6 +34,7 @@ def draw_paths(
 
     Raises:
         MissingPackageError: matplotlib is not installed.
+        GeometryError: `axes` are not such axes.
     """
     try:
         import matplotlib.pyplot as plt
@@ -41,6 +42,12 @@ def draw_paths(
         raise MissingPackageError(
             f"a plot needs matplotlib, which cannot be loaded ({error}): pip install 'mjwrap[demo]'"
         ) from None
+    if axes is not None and getattr(axes, "name", "") != "3d":
+        given = "axes in the plane" if hasattr(axes, "set_xlabel") else type(axes).__name__
+        raise GeometryError(
+            f"axes must be matplotlib's 3D axes, such as plt.figure().add_subplot(projection='3d'), or None, "
+            f"not {given}"
+        )
     if axes is None:
         beside = 1.5 + 1.1 * (len(paths) // ROWS)  # for the labels and a legend [in]
         figure = plt.figure(figsize=(6.0 + beside, 5.5))

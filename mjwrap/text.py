@@ -1,5 +1,6 @@
 """The wording of messages and tables."""
 
+import difflib
 from collections.abc import Collection, Iterable, Sequence
 
 
@@ -15,6 +16,20 @@ def counted_paths(total: int, cables: int, tendons: int = 0) -> str:
     if tendons:
         words.append(f"{counted(tendons, 'tendon')} without an actuator")
     return " and ".join(words) or counted(0, "muscle")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return " (did you mean ...?)" with at most three known names like a wrong one, the best first, or an empty text.
+
+    Capitals do not count.
+    """
+    by_lower: dict[str, list[str]] = {}
+    for each in known:
+        by_lower.setdefault(each.lower(), []).append(each)
+    close = [
+        each for key in difflib.get_close_matches(name.lower(), by_lower, n=3) for each in by_lower[key]
+    ][:3]
+    return f" (did you mean {' or '.join(repr(each) for each in close)}?)" if close else ""
 
 
 def aligned(rows: Iterable[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:

@@ -199,3 +199,25 @@ def test_warmup_leaves_nothing_to_compile(capsys: pytest.CaptureFixture[str]) ->
     )
     done = finish(start("run", ELBOW, "--duration", "0.01", "--mode", "wrench"))
     assert (done.code, done.err) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["run", ELBOW, "--exitation", "pulses"], r"arguments: --exitation pulses \(did you mean '--excitation'"),
+        (["inspect", ELBOW, "--muscle=BRA"], r"--muscle=BRA; plot and init have --muscle, not mjwrap inspect \(see"),
+        (["run", ELBOW, "--tendons"], r"compare and check have --tendons, not mjwrap run"),
+        (["check", ELBOW, "--frob"], r"unrecognized arguments: --frob \(see mjwrap check --help\)"),
+        (["inspect", ELBOW, "extra"], r"unrecognized arguments: extra \(see"),
+        (["inpsect", ELBOW], r"no command 'inpsect' \(did you mean 'inspect'\?\); commands: run"),
+    ],
+)  # fmt: skip
+def test_an_unknown_option_is_answered_with_what_was_meant(
+    arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code: object = main(arguments)
+    except SystemExit as stopped:
+        code = stopped.code
+    assert code == 2
+    assert re.search(told, capsys.readouterr().err)

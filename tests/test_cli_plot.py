@@ -212,7 +212,7 @@ def test_many_muscles_have_a_panel_each(
         (["--joint", "elbow", "--range", "90deg,0deg", "--csv", "{out}"], "second number must be larger"),
         (
             ["--joint", "elbow", "--range", "0,90", "--csv", "{out}"],
-            "0 to 90 rad are 14.3 turns.*elbow=0deg,90deg",
+            "0 to 90 rad are 14.3 turns.*write 0deg,90deg$",
         ),
         (["--joint", "elbow", "--range", "0", "--csv", "{out}"], "write LOW,HIGH, such as"),
         (

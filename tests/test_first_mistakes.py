@@ -29,6 +29,11 @@ COPY = """<tuple name="mjwrap_copy">
       <element objtype="numeric" objname="TRI_optimal_force"/>
     </tuple></custom>"""
 
+CABLE = """<tendon><spatial name="T"><site site="triceps_origin"/><site site="triceps_insertion"/></spatial></tendon>
+  <actuator><motor name="M" tendon="T" gear="10" ctrlrange="0 1"/></actuator>"""
+NUMERIC, SIDE = '<numeric name="BIC_max', listed("site", "elbow_side", ' prm="1"')
+BIC_FORCE = listed("numeric", "BIC_max_isometric_force")
+
 
 class Case(NamedTuple):
     """A mistake: edits of the model, the command, its exit code, and the element and remedy that it must name."""
@@ -85,6 +90,13 @@ CASES: dict[str, Case] = {
         [("<actuator/>", '<actuator><muscle name="M" joint="elbow" lengthrange="0 1"/></actuator>')],
         INSPECT, 0, ["actuator 'M'", "muscle on joint 'elbow'", "let it pull a spatial tendon"],
     ),
+    "cable that can only push": Case(
+        [("<actuator/>", CABLE)], INSPECT, 0, ["cable 'M'", "can only push", 'write gear="-10"']
+    ),
+    "actuation switched off": Case(
+        [('<compiler angle="degree"/>', '<compiler angle="degree"/><option><flag actuation="disable"/></option>')],
+        INSPECT, 0, ["model switches all actuators off", "leave out <flag actuation"],
+    ),
     "copy of a muscle": Case(
         [("</custom>", COPY)], INSPECT, 0, ["muscle 'copy'", "muscle 'TRI'", "give it its own sites"]
     ),
@@ -104,6 +116,21 @@ CASES: dict[str, Case] = {
     "fibre length in millimetres": Case(
         [('data=".11"', 'data="110"')],
         INSPECT, 0, ["muscle 'BIC'", "optimal_fiber_length of 110 m", "lengths are in metres"],
+    ),
+    "time constants in milliseconds": Case(
+        [(NUMERIC, '<numeric name="BIC_activation_time_constants" data="10 40"/>' + NUMERIC),
+         (BIC_FORCE, BIC_FORCE + listed("numeric", "BIC_activation_time_constants"))],
+        INSPECT, 0, ["muscle 'BIC'", "10 and 40 s", "not in milliseconds"],
+    ),
+    "time constants exchanged": Case(
+        [(NUMERIC, '<numeric name="BIC_activation_time_constants" data=".04 .01"/>' + NUMERIC),
+         (BIC_FORCE, BIC_FORCE + listed("numeric", "BIC_activation_time_constants"))],
+        INSPECT, 0, ["muscle 'BIC'", "more slowly (0.04 s)", "activation comes first"],
+    ),
+    "contraction velocity in m/s": Case(
+        [(NUMERIC, '<numeric name="BIC_max_contraction_velocity" data="1.1"/>' + NUMERIC),
+         (BIC_FORCE, BIC_FORCE + listed("numeric", "BIC_max_contraction_velocity"))],
+        INSPECT, 0, ["muscle 'BIC'", "max_contraction_velocity of only 1.1", "optimal fibre lengths per second"],
     ),
     "ring beside the path": Case(
         [('pos=".029 0 -.2"', 'pos=".08 0 -.2"')],
@@ -144,6 +171,10 @@ CASES: dict[str, Case] = {
     ),
     "no surface where one is needed": Case(
         NO_WRAP, SWEEP, 0, ["muscle 'TRI' has moment arms of both signs about joint 'elbow'", "add a surface"]
+    ),
+    "surface listed twice": Case(
+        [(SIDE, SIDE + listed("geom", "elbow_wrap"))],
+        INSPECT, 0, ["muscle 'BIC'", "wraps geom 'elbow_wrap' twice", "leave one of them out"],
     ),
     "site listed twice": Case(
         [(listed("site", "via"), 2 * listed("site", "via"))],
@@ -197,6 +228,10 @@ CASES: dict[str, Case] = {
     "states in degrees that do not say so": Case(
         [], ("replay", "{table}", "--model", "{model}", "--out", "{out}"), 2, ["column 'elbow'", "inDegrees=yes"]
     ),
+    "table of a few degrees that does not say so": Case(
+        [], (*RUN, "--prescribe", "{few}"), 0,
+        ["column 'elbow' reaches 4 rad at time 1 s", "outside the range of joint 'elbow'", "inDegrees=yes"],
+    ),
     "many turns of a wheel": Case(
         [], (*RUN, "--prescribe", "axle=90"), 0, ["warning: 'axle=90'", "14.3 turns of joint 'axle'", "write 90deg"]
     ),
@@ -211,7 +246,11 @@ def command_of(case: Case, folder: Path) -> list[str]:
     model, table = folder / "arm.xml", folder / "ik.mot"
     model.write_text(edited(*case.edits))
     mw.write_table(table, mw.Table(np.array([0.0, 1.0]), ("elbow",), np.array([[0.0], [90.0]])))
-    name, *rest = (w.format(model=model, table=table, out=folder / "o.csv") for w in case.command)
+    few = folder / "few.mot"
+    if "{few}" in case.command:
+        mw.write_table(few, mw.Table(np.array([0.0, 1.0]), ("elbow",), np.array([[0.0], [4.0]])))
+    given = {"model": model, "table": table, "few": few, "out": folder / "o.csv"}
+    name, *rest = (w.format(**given) for w in case.command)
     needs_model = name != "replay"
     source = CASE2 if any("cylinder_y" in word for word in rest) else str(model)
     return [name, *[source] * needs_model, *rest]

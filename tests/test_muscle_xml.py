@@ -137,12 +137,12 @@ def test_random_routes_are_read_back() -> None:
         ("BRA_origin,flexor_cylinder,BRA_origin", {}, "one site only, 'BRA_origin'"),
         ("BRA_origin,,BRA_insertion", {}, "at least two stops"),
         ("flexor_cylinder,BRA_insertion", {}, "first stop must be a site, not geom 'flexor_cylinder'"),
-        ("BRA_orgin,BRA_insertion", {}, "no site or geom 'BRA_orgin'; did you mean BRA_origin"),
+        ("BRA_orgin,BRA_insertion", {}, "no site or geom 'BRA_orgin' .did you mean 'BRA_origin'"),
         ("geom/zzz,BRA_insertion", {}, "no geom 'zzz'; there are: humerus_shaft"),
         (
             "BRA_origin,flexor_cylinder:flexor_sid,BRA_insertion",
             {},
-            "hint 'flexor_sid' is not a site; did you mean",
+            "hint 'flexor_sid' is not a site .did you mean",
         ),
         (
             "BRA_origin,flexor_cylinder@tours=1/2,BRA_insertion",
@@ -163,7 +163,7 @@ def test_random_routes_are_read_back() -> None:
         (
             ROUTE,
             {"parameters": {"max_isometric": 3.0}},
-            "no parameter 'max_isometric'; did you mean max_isometric_f",
+            "no parameter 'max_isometric' .did you mean 'max_isometric_f",
         ),
         (ROUTE, {"parameters": {"optimal_force": "much"}}, "optimal_force must be a number, not 'much'"),
         (ROUTE, {"law": "hill"}, "law 'hill' does not exist; laws: degroote"),

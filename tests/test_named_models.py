@@ -2,6 +2,7 @@
 
 import sys
 import types
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -150,3 +151,41 @@ def test_no_package_and_a_broken_one_are_told_apart(
     monkeypatch.delitem(sys.modules, "myo_sim", raising=False)
     with pytest.raises(mw.ModelError, match=told):
         read_model("myo_sim:elbow")
+
+
+@pytest.mark.parametrize("handled", [False, True])
+def test_loading_a_composed_model_shows_no_warning_of_its_prefix(
+    handled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("myo_sim")
+    monkeypatch.chdir(tmp_path)
+    told: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(told.append if handled else None)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            mw.load("myo_sim:myoarm_r")
+            named_models.myo_model("myo_sim:myoarm_r")
+        assert (mujoco.get_mju_user_warning() is not None) == handled
+    finally:
+        mujoco.set_mju_user_warning(before)
+    assert told == []
+    assert "empty prefix" not in "".join(capfd.readouterr())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_warnings_are_shown_as_before() -> None:
+    told: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        with named_models.quiet_prefixes("myo_sim:any"):
+            handler = mujoco.get_mju_user_warning()
+            handler(named_models.NOISE + " and so on")
+            handler("another warning")
+        with named_models.quiet_prefixes(ELBOW):
+            mujoco.get_mju_user_warning()(named_models.NOISE)
+    finally:
+        mujoco.set_mju_user_warning(before)
+    assert told == ["another warning", named_models.NOISE]

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from cli_runs import ELBOW, ROOT
+from first_model import compiled
 from test_curves import ARM
 
 import mjwrap as mw
@@ -161,7 +162,9 @@ def test_muscles_are_a_sequence(elbow: tuple[mw.MuscleSystem, mujoco.MjData]) ->
     for wrong in (7, -8):
         with pytest.raises(mw.GeometryError, match="does not exist; there are 7"):
             muscles[wrong]
-    with pytest.raises(mw.GeometryError, match=r"no muscle 'BRa'; did you mean BRD or BRA.*muscles: TRIlong"):
+    with pytest.raises(
+        mw.GeometryError, match=r"no muscle 'BRa' .did you mean 'BRA' or 'BRD'.*muscles: TRIlong"
+    ):
         muscles["BRa"]
 
 
@@ -297,3 +300,53 @@ def test_curves_and_sweeps_are_short() -> None:
                            np.tile([1.0, 0, 0, 0], (4, 1, 1)))  # fmt: skip
     assert repr(sweep).startswith("SweepSolution(4 poses, all converged, length 0.2")
     assert len(repr(sweep)) < 100
+
+
+def test_a_system_that_is_not_evaluated_says_so() -> None:
+    model = mujoco.MjModel.from_xml_path(ELBOW)
+    muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
+    for shown in (muscles, muscles["BRA"]):
+        assert not muscles.evaluated
+        assert "not evaluated yet: call forward(data)" in repr(shown)
+        assert "not evaluated yet" in shown._repr_html_()
+        assert "CONVERGED" not in repr(shown) + shown._repr_html_()
+        with pytest.raises(mw.StateError, match="no paths to draw: not evaluated yet"):
+            shown.plot()
+        muscles.forward(data)
+        assert muscles.evaluated
+        assert "not evaluated" not in repr(shown) + shown._repr_html_()
+        assert "CONVERGED" in shown._repr_html_()
+        muscles.reset(data)
+    installed = mw.load(ELBOW)
+    inside = mujoco.MjData(installed)
+    results = Muscles(inside)
+    assert "not evaluated yet" in repr(results)
+    mujoco.mj_step(installed, inside)
+    assert results.evaluated
+    assert "CONVERGED" in repr(results["BRA"])
+
+
+def test_a_picture_says_which_path_was_not_found() -> None:
+    inside = mw.solve_path((0, 0.01, 0), (-0.2, 0.05, 0.06), [mw.Obstacle(mw.Cylinder(0.03))])
+    assert "ENDPOINT_INSIDE" in inside.plot().get_title()
+    assert mw.solve_path((0.1, 0.01, 0), (-0.2, 0.05, 0.06)).plot().get_title() == ""
+    model = compiled(('"insertion" pos=".022 0 -.08"', '"insertion" pos=".01 0 -.01"'))
+    muscles = mw.MuscleSystem(model)
+    muscles.forward(mujoco.MjData(model))
+    assert [text.get_text() for text in muscles.plot().get_legend().get_texts()] == [
+        "BIC (ENDPOINT_INSIDE)",
+        "TRI",
+    ]
+    plt.close("all")
+
+
+@pytest.mark.parametrize("wrong", ["x", 3, "plane"])
+def test_axes_of_another_kind_are_a_named_error(wrong: object) -> None:
+    model = mujoco.MjModel.from_xml_path(ELBOW)
+    muscles = mw.MuscleSystem(model)
+    muscles.forward(mujoco.MjData(model))
+    axes = plt.subplots()[1] if wrong == "plane" else wrong
+    for shown in (muscles, muscles["BRA"], mw.solve_path((0, 0, 0), (1, 1, 1))):
+        with pytest.raises(mw.GeometryError, match="axes must be matplotlib's 3D axes"):
+            shown.plot(axes)
+    plt.close("all")

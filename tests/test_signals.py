@@ -8,7 +8,7 @@ import pytest
 
 import mjwrap as mw
 from mjwrap.runs.excitation import Excitation
-from mjwrap.runs.signals import Constant, Samples, Sine, parse_pattern, pattern_forms
+from mjwrap.runs.signals import Constant, Samples, Sine, match_columns, parse_pattern, pattern_forms
 
 TWO = """
 <mujoco>
@@ -211,3 +211,33 @@ def test_unknown_names_list_what_exists(entry: str, model: mujoco.MjModel, tmp_p
 def test_something_with_a_folder_in_its_name_is_taken_for_a_file(model: mujoco.MjModel) -> None:
     with pytest.raises(mw.SignalError, match="neither a file nor a pattern"):
         Excitation(mw.MuscleSystem(model), ["out/excitation.txt"])
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("0.5", r"'0\.5' is not a pattern; for a level that stays write constant:0\.5; patterns: "),
+        ("pulse", r"'pulse' is not a pattern \(did you mean 'pulses'\?\); patterns: "),
+        ("table.csv", r"; a table drives the muscles of its columns: write its name alone"),
+        ("wiggle", r"'wiggle' is not a pattern; patterns: "),
+    ],
+)
+def test_what_is_not_a_pattern_is_answered_with_what_is(text: str, told: str) -> None:
+    with pytest.raises(mw.SignalError, match=told):
+        parse_pattern(text)
+
+
+def test_a_table_for_another_option_is_named() -> None:
+    def table(column: str) -> mw.Table:
+        return mw.Table(np.zeros(1), (column,), np.zeros((1, 1)))
+
+    with pytest.raises(
+        mw.SignalError, match=r"no muscle for column.*there are: BRA; the motion of joints is prescribed"
+    ):
+        match_columns(table("/jointset/elbow/flexion/value"), ["BRA"], "muscle")
+    with pytest.raises(
+        mw.SignalError, match="there are: flexion; these are muscles: give the table as excitation"
+    ):
+        match_columns(table("/forceset/BRA"), ["flexion"], "hinge or slide")
+    with pytest.raises(mw.SignalError, match=r"there are: BRA$"):
+        match_columns(table("BRD"), ["BRA"], "muscle")

@@ -155,6 +155,7 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
     }  # fmt: skip
     for name, arguments in ways.items():
         found[f"PathSolution.{name}"] = lambda n=name, a=arguments: Call(getattr(path, n), a)
+    found["plugin.native"] = lambda: Call(plugin.native, (mw.load(ELBOW),))
     found["plugin.read"] = lambda: Call(plugin.read, (mujoco.MjData(mw.load(ELBOW)),))
     return found
 
@@ -261,6 +262,11 @@ def test_a_wrong_type_is_named(
         (lambda v: mw.install(ELBOW), r"mw\.load\(path\)"),
         (lambda v: mw.load(v["MjModel"]), r"not an MjModel; .*mw\.MuscleSystem\(model\)"),
         (lambda v: mw.load(v["MjSpec"]), r"not an MjSpec; a spec goes to mw\.install\(spec\)"),
+        (
+            lambda v: mw.load("<mujoco>\n</mujoco>"),
+            r"not the text of a model: write mw\.install\(mujoco\.MjSpec",
+        ),
+        (lambda v: mw.load(""), "path must be the name of a file, or mjwrap:NAME or myo_sim:NAME, .*not ''"),
         (lambda v: mw.load(None), "path must be the name of a file, or mjwrap:NAME or myo_sim:NAME"),
         (lambda v: mw.length_ranges(v["MjModel"]), r"make one: mw\.MuscleSystem\(model\)"),
         (lambda v: v["MuscleSystem"].forward(v["MjModel"]), r"mujoco\.MjData\(model\)"),

@@ -15,7 +15,9 @@ from mjwrap import validation
 from mjwrap.calibration.ascent import Ascent, ascend
 from mjwrap.calibration.joints import JointSpace
 from mjwrap.errors import ModelError
+from mjwrap.mjcf import names as all_names
 from mjwrap.paths import Status
+from mjwrap.poses.angles import check_range
 from mjwrap.system import MuscleSystem, twin_of
 
 Array = NDArray[np.float64]
@@ -145,7 +147,8 @@ def length_ranges(
         The length range of each muscle, by name.
 
     Raises:
-        ModelError: a name is unknown, a range is not possible, or `muscles` is not a MuscleSystem.
+        ModelError: a name is unknown, a range is not possible or only degrees can explain it, or `muscles` is not a
+            MuscleSystem.
     """
     if not isinstance(muscles, MuscleSystem):
         validation.of_type(muscles, "MuscleSystem", "muscles", ModelError)
@@ -167,6 +170,9 @@ def length_ranges(
     model = copy.copy(muscles.model)
     chosen = [i for i, name in enumerate(muscles.names) if names is None or name in names]
     space = JointSpace(model, model.qpos0 if base is None else base, ranges or {})
+    joints = all_names(model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt)
+    for name, (low, high) in (ranges or {}).items():
+        check_range(model, joints.index(name), low, high)
     moved, held = space.moves(muscles.declarations)
     lengths = _Lengths(twin_of(muscles, model), space)
     searches = _starts(lengths, chosen, moved, starts, samples, np.random.default_rng(seed))

@@ -13,6 +13,7 @@ import mjwrap
 from mjwrap.cli.common import console
 from mjwrap.cli.common.errors import RUN_FAILED, USER_ERROR, RunError
 from mjwrap.cli.common.output import note_inputs, say, written
+from mjwrap.text import nearest
 
 COMMANDS = {
     "import": "turn an OpenSim model (.osim) into a MuJoCo model with geodesic muscles",
@@ -81,7 +82,8 @@ def _command(given: list[str]) -> int:
     if first not in COMMANDS:
         kind = "option" if first.startswith("-") else "command"
         print(
-            f"mjwrap: no {kind} '{first}'; commands: {', '.join(COMMANDS)} (see mjwrap --help)",
+            f"mjwrap: no {kind} '{first}'{nearest(first, COMMANDS)}; commands: {', '.join(COMMANDS)} (see mjwrap "
+            "--help)",
             file=sys.stderr,
         )
         return USER_ERROR
@@ -94,11 +96,22 @@ def module_of(name: str) -> ModuleType:
     return importlib.import_module(f"{room.__name__}.command") if hasattr(room, "__path__") else room
 
 
+def parser_of(name: str) -> console.Parser:
+    """Return the parser of a command."""
+    command = module_of(name)
+    parser = console.Parser(f"mjwrap {name}", command.__doc__ or "", _commands_with)
+    command.add_arguments(parser)
+    return parser
+
+
+def _commands_with(option: str) -> list[str]:
+    """Return the commands that have an option."""
+    return [name for name in COMMANDS if option in parser_of(name).options()]
+
+
 def _execute(name: str, arguments: list[str]) -> int:
     command = module_of(name)
-    parser = console.Parser(f"mjwrap {name}", command.__doc__ or "")
-    command.add_arguments(parser)
-    options = parser.parse_args(arguments)
+    options = parser_of(name).parse_args(arguments)
     options.given = list(arguments)  # as typed, for outputs that quote the command
     note_inputs(console.inputs(options))
     if name in EVALUATING:

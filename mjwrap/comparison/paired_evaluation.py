@@ -42,6 +42,11 @@ LENGTH = (
     3e-9  # largest difference of a path's length from the sum of its parts, as a share of the muscle's size
 )
 TURN = 2.0 * np.pi
+# why a muscle is not compared whose path MuJoCo does not have
+PLACEHOLDER, NO_TENDON = (
+    "its tendon is a placeholder: mjwrap's route is different",
+    "it has no tendon in MuJoCo",
+)
 NARROW = 1e-6  # the same of two points that coincide, so that rounding chooses the direction between them
 
 
@@ -145,11 +150,11 @@ class Comparer:
             index = self.muscles.index(name)
             declared = self.muscles.declarations[index]
             if declared.tendon < 0:
-                return "it has no tendon in MuJoCo"
+                return NO_TENDON
             own = muscle_spans(declared)
             spans = tendon_spans(model, self._native_data, declared.tendon)
             if own is None or [span._replace(turn=0.0) for span in own] != spans:
-                return "its tendon is a placeholder: mjwrap's route is different"
+                return PLACEHOLDER
             return self._sized(name, index, declared.tendon, own)
         actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if actuator < 0 or int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):

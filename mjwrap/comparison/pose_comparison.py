@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.comparison.jumps import Jump, find_jumps
 from mjwrap.comparison.motion import pristine
-from mjwrap.comparison.paired_evaluation import Batch, Comparer
+from mjwrap.comparison.paired_evaluation import NO_TENDON, PLACEHOLDER, Batch, Comparer
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.errors import ModelError
 from mjwrap.poses.joint_sweeps import PoseMaker
@@ -41,6 +41,11 @@ class PoseComparison:
     def total(self, outcome: Outcome) -> int:
         """Return the number of poses, over all muscles, with an outcome."""
         return sum(summary.counts[outcome.name] for summary in self.muscles.values())
+
+    @property
+    def unlike(self) -> list[str]:
+        """Muscles that MuJoCo pulls along another route, or not at all, so that motions must differ."""
+        return [name for name, reason in self.left_out.items() if reason in (PLACEHOLDER, NO_TENDON)]
 
     @property
     def at_fault(self) -> int:

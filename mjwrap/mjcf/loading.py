@@ -13,8 +13,9 @@ import mujoco
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.file_kinds import OPENSIM, foreign
 from mjwrap.mjcf.missing_names import with_candidates
-from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, nearest, own_file, own_models
+from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, own_file, own_models
 from mjwrap.mjcf.names import listed
+from mjwrap.text import nearest
 
 
 def is_binary(path: str | os.PathLike[str]) -> bool:
@@ -80,7 +81,13 @@ def _source(path: object) -> str:
     """Return the argument of a loader as text; `ModelError` if it is not the name of a file or model."""
     if isinstance(path, str | os.PathLike):
         text = os.fspath(path)
-        if isinstance(text, str):
+        if isinstance(text, str) and text.lstrip().startswith("<"):
+            raise ModelError(
+                "path must be the name of a file, not the text of a model: write "
+                "mw.install(mujoco.MjSpec.from_string(text)), or for a MuscleSystem "
+                "mujoco.MjModel.from_xml_string(text)"
+            )
+        if isinstance(text, str) and text:
             return text
     given = f"an {type(path).__name__}" if isinstance(path, mujoco.MjModel | mujoco.MjSpec) else repr(path)
     remedy = {

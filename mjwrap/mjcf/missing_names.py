@@ -6,8 +6,8 @@ import re
 
 import mujoco
 
-from mjwrap.mjcf.named_models import nearest
 from mjwrap.mjcf.names import listed
+from mjwrap.text import nearest
 
 _MISSING = re.compile(r"(?P<kind>[\w ]*?)\s*'(?P<name>[^']*)' (?:not found )?in \w+ \d+")
 _LISTED = 12  # names to list where none resembles the missing one

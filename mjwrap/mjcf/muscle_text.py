@@ -5,7 +5,6 @@ Text is written, not an MjSpec, because MjSpec.to_xml rounds numbers to six digi
 
 from __future__ import annotations
 
-import difflib
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,6 +32,7 @@ from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.muscles import laws
 from mjwrap.muscles.activation import FORMS
 from mjwrap.muscles.laws import PASSIVE_LAWS, REFUSED, TENDONS, MuJoCoMuscle
+from mjwrap.text import nearest
 
 OBJ = mujoco.mjtObj
 NATIVE = ("lengthrange", "force", "range", "scale", "lmin", "lmax", "vmax", "fpmax", "fvmax", "timeconst")
@@ -131,11 +131,9 @@ def _read_parameters(
                 raise ModelError(f"muscle '{name}': {key} must be a number, not {value!r}") from None
         else:
             known = (*NUMERICS, TENDON, DYNAMICS)
-            near = difflib.get_close_matches(key, (*known, *NATIVE))
-            meant = f"did you mean {' or '.join(near)}? " if near else ""
             raise ModelError(
-                f"muscle '{name}': no parameter '{key}'; {meant}parameters: {listed(known)}; for the law mujoco: "
-                f"{listed(NATIVE)}"
+                f"muscle '{name}': no parameter '{key}'{nearest(key, (*known, *NATIVE))}; parameters: "
+                f"{listed(known)}; for the law mujoco: {listed(NATIVE)}"
             )
     return numbers, words
 

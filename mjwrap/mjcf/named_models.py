@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import importlib.metadata
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import mujoco
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed
+from mjwrap.text import nearest
 
 OWN, MYO = "mjwrap:", "myo_sim:"
+NOISE = "Attaching a spec with an empty prefix"  # matters only when such a spec is saved
 _PACKAGE = Path(__file__).resolve().parents[1]
 # a wheel has the models inside the package (pyproject.toml, force-include), a clone beside it
 _FOLDERS = (_PACKAGE / "models", _PACKAGE.parent / "models")
@@ -67,7 +70,8 @@ def myo_spec(source: str) -> mujoco.MjSpec:
     try:
         # 0.2.3 and older have no postures, and the oldest no build_kwargs
         postures = hasattr(package, "list_postures") and package.list_postures(name)
-        return package.load_spec(name, **({"build_kwargs": {"postures": True}} if postures else {}))
+        with quiet_prefixes(source):
+            return package.load_spec(name, **({"build_kwargs": {"postures": True}} if postures else {}))
     except Exception as error:
         raise _broken(source, error) from None
 
@@ -76,16 +80,34 @@ def myo_model(source: str) -> mujoco.MjModel:
     """Return the compiled model of "myo_sim:NAME"; errors as of `myo_spec`."""
     spec = myo_spec(source)
     try:
-        return spec.compile()
+        with quiet_prefixes(source):
+            return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise _broken(source, error) from None
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return " (did you mean ...?)" with the known names that resemble a name, the best first, or an empty string."""
-    by_lower = {each.lower(): each for each in known}
-    close = [by_lower[each] for each in difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.6)]
-    return f" (did you mean {' or '.join(repr(each) for each in close)}?)" if close else ""
+@contextmanager
+def quiet_prefixes(source: object) -> Iterator[None]:
+    """Do not show MuJoCo's warning of an empty prefix inside a with block, if the source is "myo_sim:NAME".
+
+    It comes whenever such a spec compiles, because of how the package composes its models, and says nothing of use.
+    """
+    if not (isinstance(source, str) and source.startswith(MYO)):
+        yield
+        return
+    before = mujoco.get_mju_user_warning()
+
+    def show(text: str) -> None:
+        if not text.startswith(NOISE):
+            (before or warnings.warn)(text)
+
+    mujoco.set_mju_user_warning(show)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=NOISE)
+            yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _broken(source: str, error: Exception) -> ModelError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import mujoco
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import listed, names
 from mjwrap.mjcf.wrapping_geoms import SIZES
+from mjwrap.text import nearest
 
 OBJ = mujoco.mjtObj
 SHAPES = {key.removesuffix("_size"): sizes for key, sizes in SIZES.items()}
@@ -75,12 +75,12 @@ def _read_stop(model: mujoco.MjModel, word: str) -> Stop:
     if name not in geoms or kind == "site":
         wanted = {"site": sites, "geom": geoms}.get(kind, [*sites, *geoms])
         what = kind or "site or geom"
-        raise ModelError(f"'{word}': the model has no {what} '{name}'; {_near(name, wanted, 'there are')}")
+        raise ModelError(f"'{word}': the model has no {what} '{name}'{_near(name, wanted, 'there are')}")
     side = hint not in sites and hint.startswith(SIDE)
     hint = hint.removeprefix(SIDE) if side else hint
     if (hint or side) and hint not in sites:
         raise ModelError(
-            f"'{word}': the {'side' if side else 'hint'} '{hint}' is not a site; {_near(hint, sites, 'sites')}"
+            f"'{word}': the {'side' if side else 'hint'} '{hint}' is not a site{_near(hint, sites, 'sites')}"
         )
     return Stop("geom", name, hint, shape, sizes, side)
 
@@ -104,5 +104,4 @@ def _read_shape(word: str, text: str) -> tuple[str, tuple[float, ...]]:
 
 def _near(name: str, known: Sequence[str], what: str) -> str:
     """Return names like a wrong one for a message, else all of them."""
-    near = difflib.get_close_matches(name, known)
-    return f"did you mean {' or '.join(near)}?" if near else f"{what}: {listed(known)}"
+    return nearest(name, known) or f"; {what}: {listed(known)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -52,12 +53,19 @@ def contact_marks(contacts: Sequence[Contact]) -> Array:
 
 
 def plot(
-    points: Array, contacts: Sequence[Contact], obstacles: Sequence[Obstacle | ViaPoint], axes: Any
+    points: Array,
+    contacts: Sequence[Contact],
+    obstacles: Sequence[Obstacle | ViaPoint],
+    axes: Any,
+    title: str = "",
 ) -> Any:
-    """Draw a path, its contacts and the surfaces into axes, and return these."""
+    """Draw a path, its contacts and the surfaces into axes, with a title if it is not empty, and return these."""
     ends = points[[0, -1]]
     marks = np.vstack([ends, contact_marks(contacts)])
-    return plots.draw_paths([("", points)], marks, surface_grids(obstacles, _reach(points)), axes)
+    drawn = plots.draw_paths([("", points)], marks, surface_grids(obstacles, _reach(points)), axes)
+    if title:
+        drawn.set_title(textwrap.fill(title, 60), y=0.92, fontsize=9)
+    return drawn
 
 
 def svg(points: Array, contacts: Sequence[Contact], obstacles: Sequence[Obstacle | ViaPoint]) -> str:

@@ -163,11 +163,13 @@ class PathSolution(Derivatives):
     def plot(self, axes: Any = None) -> Any:
         """Draw the path, its contact points and the surfaces in space, with matplotlib, and return the axes.
 
-        axes: 3D axes to draw into; None for a new figure. Raises `MissingPackageError` without matplotlib.
+        A path that was not found has its status as the title. axes: 3D axes to draw into; None for a new figure. Raises
+        `MissingPackageError` without matplotlib, `GeometryError` for other axes.
         """
         from mjwrap.paths import pictures
 
-        return pictures.plot(self.points(), self.contacts, self._obstacles, axes)
+        told = "" if self.converged else f"{self.status.name}: {self.status.message}"
+        return pictures.plot(self.points(), self.contacts, self._obstacles, axes, told)
 
     def points(self, spacing: float | None = None) -> Array:
         """Return points along the path, (m, 3), world [m], at most `spacing` [m] apart.

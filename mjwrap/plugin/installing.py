@@ -20,6 +20,7 @@ from mjwrap.mjcf import (
 )
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.mjcf.missing_names import with_candidates
+from mjwrap.mjcf.named_models import quiet_prefixes
 from mjwrap.mjcf.side_rules import check_side_rule, running_side_rule
 from mjwrap.model.moment_columns import check_moment_columns
 from mjwrap.model.piece_table import piece_table
@@ -188,10 +189,11 @@ def load(
     """
     _check_options(WRENCH if mode is None else mode, keep_tendons, side_rule)
     register()
-    model = read_model(path)
-    renumber(model)
-    if not is_binary(path):
-        return install(read_spec(path), mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
+    with quiet_prefixes(path):
+        model = read_model(path)
+        renumber(model)
+        if not is_binary(path):
+            return install(read_spec(path), mode or WRENCH, keep_tendons=keep_tendons, side_rule=side_rule)
     instances = own_instances(model)
     saved = [configuration_at(model._address, i) for i in instances]
     modes, rules = {each.mode for each in saved}, {each.side_rule for each in saved}

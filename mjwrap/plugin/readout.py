@@ -51,7 +51,8 @@ class Readout:
 
 
 def instances(model: mujoco.MjModel) -> list[int]:
-    """Return the ids of mjwrap's instances in a model; `StateError` if there are none."""
+    """Return the ids of mjwrap's instances in a model; `StateError` if there are none, or it is not a model."""
+    validation.of_type(model, "MjModel", "model", StateError)
     found = own_instances(model)
     if not found:
         raise StateError(

@@ -18,11 +18,12 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.inside import reference_pose
 from mjwrap.mjcf.names import listed, name_of
 from mjwrap.model.takeover import Takeover
+from mjwrap.poses.angles import check_range
 from mjwrap.poses.continuation import PathFollower, Place
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.poses.tendon_curves import native_tendons, tendon_rows
 from mjwrap.system import CableSystem, is_cable
-from mjwrap.text import counted_paths
+from mjwrap.text import counted_paths, nearest
 
 Array = NDArray[np.float64]
 _SINGLE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -100,7 +101,9 @@ class JointCurves:
 
     def __getitem__(self, quantity: str) -> Array:
         if quantity not in self.values:
-            raise ModelError(f"no quantity '{quantity}'; there are: {', '.join(self.values)}")
+            raise ModelError(
+                f"no quantity '{quantity}'{nearest(str(quantity), self.values)}; there are: {', '.join(self.values)}"
+            )
         return self.values[quantity]
 
 
@@ -143,7 +146,8 @@ def curves(
         The curves.
 
     Raises:
-        ModelError: there is no such joint or muscle, the joint moves no muscle, or an argument is out of its range.
+        ModelError: there is no such joint or muscle, the joint moves no muscle, an argument is out of its range, or
+            only degrees can explain the span.
     """
     validation.of_type(model, "MjModel", "model", ModelError)
     validation.instance(joint, str, "joint", ModelError, "the name of a hinge or slide")
@@ -151,6 +155,8 @@ def curves(
     samples = validation.whole(samples, 2, "samples", ModelError)
     _check(model, muscles, span, qpos, activation)
     validation.flag(native, "native", ModelError)
+    if span is not None:
+        check_range(model, index, *span)
     with Takeover(model).original_limits():
         model = copy.copy(model)  # its actuators are disabled below
     system = CableSystem(model, side_rule=side_rule)
@@ -230,7 +236,7 @@ def _joint(model: mujoco.MjModel, name: str) -> int:
         if int(model.jnt_type[j]) in _SINGLE
     }
     if name not in single:
-        raise ModelError(f"no hinge or slide '{name}'; there are: {listed(single)}")
+        raise ModelError(f"no hinge or slide '{name}'{nearest(name, single)}; there are: {listed(single)}")
     return single[name]
 
 
@@ -292,6 +298,6 @@ def _chosen(
         fit = [known.index(pattern)] if pattern in known else []
         fit = fit or [i for i, name in enumerate(known) if fnmatch.fnmatchcase(name, pattern)]
         if not fit:
-            raise ModelError(f"no muscle '{pattern}'; muscles: {listed(known)}")
+            raise ModelError(f"no muscle '{pattern}'{nearest(pattern, known)}; muscles: {listed(known)}")
         found += [i for i in fit if i not in found]
     return found

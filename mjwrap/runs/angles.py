@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -16,15 +17,11 @@ from numpy.typing import ArrayLike
 from mjwrap.errors import MjwrapError, ModelError, SignalError, TableError
 from mjwrap.files import Table
 from mjwrap.mjcf import name_of
+from mjwrap.poses.angles import BEYOND, TURNS, Angle
 
-BEYOND = math.pi  # [rad] no position of a hinge with a range can be meant that is further outside
-TURNS = 4.0 * math.pi  # [rad] a hinge without a range seldom turns further
+OUTSIDE = 0.1  # [rad] a measured motion may leave a joint's range by less
 _DEGREES = re.compile(r"(deg|°)$")
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
-
-
-class Angle(float):
-    """A position [rad] that was given in degrees, so it fits hinges only."""
 
 
 def position(text: str) -> float:
@@ -93,62 +90,55 @@ def check_position(
         )
 
 
-def check_range(model: mujoco.MjModel, joint: int, low: float, high: float) -> None:
-    """Raise `ModelError` for a range [rad] of a hinge that only degrees can explain.
-
-    That is one that goes half a turn or more beyond the model's own range, or more than two turns without one.
-    """
-    name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
-    entry = f"range of joint '{name}'"
-    for end in (low, high):
-        if isinstance(end, Angle) and int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE):
-            raise ModelError(f"{entry}: it is a slide: give its range in m, without deg")
-    if int(model.jnt_type[joint]) != _HINGE or isinstance(low, Angle) or isinstance(high, Angle):
-        return
-    own = [float(x) for x in model.jnt_range[joint]]
-    limited = bool(model.jnt_limited[joint])
-    if (limited and max(own[0] - low, high - own[1]) > BEYOND) or (not limited and high - low > TURNS):
-        turns = (high - low) / (2.0 * math.pi)
-        beside = f", and the model's range is {own[0]:.4g} to {own[1]:.4g} rad" if limited else ""
-        raise ModelError(
-            f"{entry}: {low:g} to {high:g} rad are {turns:.3g} turns{beside}; if degrees are meant, write "
-            f"{name}={low:g}deg,{high:g}deg"
-        )
-
-
 def check_column(model: mujoco.MjModel, joint: int, table: Table, column: str, own: bool = False) -> None:
     """Check the positions of a hinge in a column of a table, in the unit that its header gives.
 
     own: a column of a table that mjwrap wrote, in rad, whose motion may have gone anywhere. Raises `TableError` if the
-    positions are half a turn or more outside the joint's range, unless `own`; else warns, and also of more than two
-    turns of a hinge without a range, which a wheel may make.
+    positions are half a turn or more outside the joint's range, unless `own`; else warns, and also of positions more
+    than `OUTSIDE` outside it, unless `own`, and of more than two turns of a hinge without a range, which a wheel may
+    make.
     """
     if int(model.jnt_type[joint]) != _HINGE:
         return
     values = np.radians(table[column]) if table.in_degrees else table[column]
     low, high = (float(x) for x in model.jnt_range[joint])
     limited = bool(model.jnt_limited[joint])
-    outside = np.maximum(low - values, values - high) - BEYOND if limited else np.abs(values) - TURNS
-    if not len(values) or not np.nanmax(outside) > 0.0:
+    outside = np.maximum(low - values, values - high) if limited else np.abs(values)
+    far = BEYOND if limited else TURNS
+    if not len(values) or not np.nanmax(outside) > (OUTSIDE if limited and not own else far):
         return
     k = int(np.nanargmax(outside))
     name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
-    range_ = (
-        f"joint '{name}' has a range of {low:.4g} to {high:.4g} rad"
-        if limited
-        else f"joint '{name}' has no range"
-    )
-    turns = abs(float(values[k])) / (2.0 * math.pi)
     instead = (
         "its header says that it is in degrees (inDegrees=yes)"
         if table.in_degrees
         else "if the table is in degrees, write inDegrees=yes into its header (in a CSV file: a first line '# "
         "inDegrees=yes')"
     )
-    words = (
-        f"'{table.source}', column '{column}': {table[column][k]:g} at time {table.time[k]:g} s is {turns:.3g} turns, "
-        f"and {range_}; {instead}"
-    )
-    if limited and not own:
+    value = float(values[k])
+    if outside[k] > far:
+        ranges = f"has a range of {low:.4g} to {high:.4g} rad" if limited else "has no range"
+        told = (
+            f": {table[column][k]:g} at time {table.time[k]:g} s is {abs(value) / (2.0 * math.pi):.3g} turns, and "
+            f"joint '{name}' {ranges}"
+        )
+    else:
+        told = (
+            f" reaches {value:.4g} rad at time {table.time[k]:g} s, outside the range of joint '{name}', {low:.4g} to "
+            f"{high:.4g} rad"
+        )
+    words = f"'{table.source}', column '{column}'{told}; {instead}"
+    if limited and not own and outside[k] > far:
         raise TableError(words)
     warnings.warn(words, stacklevel=3)
+
+
+def unit_taken(model: mujoco.MjModel, table: Table, joints: Mapping[str, int]) -> str:
+    """Return a remark on the unit in which hinges are read, if the table's header does not give it, else "".
+
+    joints: the joint of each column that gives a position.
+    """
+    turning = [c for c, j in joints.items() if int(model.jnt_type[j]) == _HINGE and not c.startswith("qpos")]
+    if not turning or "inDegrees" in table.metadata:
+        return ""
+    return f"angles in '{table.source}' are taken as radians, because its header does not say inDegrees=yes"

@@ -18,13 +18,17 @@ def check_levels(model: mujoco.MjModel, excitation: Excitation) -> None:
     told: dict[tuple[float, float], list[str]] = {}
     for name, signal in excitation.signals.items():
         peak, most = _peak(signal), highest.get(name, 1.0)  # 1: a muscle without an actuator
-        if peak > most * (1.0 + 1e-9):
+        if peak > most + 1e-9 * abs(most):
             told.setdefault((peak, most), []).append(name)
     for (peak, most), names in told.items():
         whose = f"'{names[0]}'" + (f" and {len(names) - 1} more" if len(names) > 1 else "")
+        remedy = (
+            "if these are percents, divide them by 100"
+            if most == 1.0
+            else "its control is in the units of its actuator, such as m for a servo of a length; see its ctrlrange"
+        )
         warnings.warn(
-            f"the excitation of {whose} reaches {peak:g}, which acts like {most:g}, the largest control; if these are "
-            f"percents, divide them by 100",
+            f"the excitation of {whose} reaches {peak:g}, which acts like {most:g}, the largest control; {remedy}",
             stacklevel=3,
         )
 

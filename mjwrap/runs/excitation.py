@@ -11,6 +11,7 @@ from mjwrap.errors import SignalError
 from mjwrap.files import SUFFIXES, read_table
 from mjwrap.runs.signals import Samples, Signal, match_columns, parse_pattern, pattern_forms
 from mjwrap.system import MuscleSystem
+from mjwrap.text import nearest
 
 
 def control_names(model: Any) -> list[str]:
@@ -67,7 +68,9 @@ class Excitation:
             found = [name] if name in self._places else fnmatch.filter(self.names, name)
             if not found:
                 known = ", ".join(self.names) or "none"
-                raise SignalError(f"'{entry}': no muscle or actuator '{name}'; there are: {known}")
+                raise SignalError(
+                    f"'{entry}': no muscle or actuator '{name}'{nearest(name, self.names)}; there are: {known}"
+                )
             self._fill(found, pattern)
         elif entry.lower().endswith(SUFFIXES) or os.path.isfile(entry):
             table = read_table(entry)

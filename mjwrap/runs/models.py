@@ -10,6 +10,7 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf import has_plugin, name_of, names, read_model, read_spec
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.runs.angles import check_position
+from mjwrap.text import nearest
 
 INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -43,7 +44,9 @@ def start_keyframe(model: mujoco.MjModel, name: str | None) -> int:
         return -1
     known = names(model, mujoco.mjtObj.mjOBJ_KEY, model.nkey)
     if name not in known:
-        raise ModelError(f"no keyframe '{name}'; keyframes: {', '.join(known) or 'none'}")
+        raise ModelError(
+            f"no keyframe '{name}'{nearest(name, known)}; keyframes: {', '.join(known) or 'none'}"
+        )
     return known.index(name)
 
 
@@ -91,7 +94,10 @@ def find_joint(model: mujoco.MjModel, name: str, entry: str) -> int:
     """Return the id of a hinge or slide; otherwise `ModelError`, which quotes the entry and lists the joints."""
     fit = single_joints(model)
     if name not in fit:
-        raise ModelError(f"'{entry}': no hinge or slide '{name}'; there are: {', '.join(fit) or 'none'}")
+        raise ModelError(
+            f"'{entry}': no hinge or slide '{name}'{nearest(name, fit)}; there are: "
+            f"{', '.join(fit) or 'none'}"
+        )
     return fit[name]
 
 

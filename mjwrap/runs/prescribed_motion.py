@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import SignalError
 from mjwrap.files import SUFFIXES, read_table
-from mjwrap.runs.angles import Angle, check_column, check_position, pattern_in_radians
+from mjwrap.poses.angles import Angle
+from mjwrap.runs.angles import check_column, check_position, pattern_in_radians, unit_taken
 from mjwrap.runs.models import find_joint, single_joints
 from mjwrap.runs.signals import Constant, Sine, SmoothSignal, match_columns, parse_pattern
 
@@ -65,6 +66,7 @@ class PrescribedMotion:
 
     def __init__(self, model: mujoco.MjModel, entries: Sequence[str], *, option: str = "") -> None:
         self._model = model
+        self.remarks: list[str] = []  # on the units of tables
         found: dict[int, SmoothSignal] = {}
         for entry in entries:
             name, equals, pattern = entry.rpartition("=")
@@ -81,7 +83,10 @@ class PrescribedMotion:
                 found[joint] = _smooth(model, joint, name, pattern)
             else:
                 table, joints = read_table(entry), single_joints(model)
-                for column, driven in match_columns(table, list(joints), "hinge or slide").items():
+                matched = match_columns(table, list(joints), "hinge or slide")
+                unit = unit_taken(model, table, {column: joints[name] for column, name in matched.items()})
+                self.remarks += [unit] if unit else []
+                for column, driven in matched.items():
                     joint = joints[driven]
                     check_column(model, joint, table, column)
                     turns = table.in_degrees and int(model.jnt_type[joint]) == _HINGE
@@ -128,7 +133,7 @@ def _smooth(model: mujoco.MjModel, joint: int, name: str, pattern: str) -> Smoot
 
 def _extremes(signal: Sine) -> tuple[float, float]:
     reach = abs(signal.amplitude)
-    return signal.offset - reach, signal.offset + reach
+    return signal.offset + reach, signal.offset - reach
 
 
 def check_free(model: mujoco.MjModel, joints: Sequence[int], positions: Mapping[str, float]) -> None:

@@ -12,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import SignalError
-from mjwrap.files import Table
+from mjwrap.files import SUFFIXES, Table
+from mjwrap.text import nearest
+
+_ELSEWHERE = {  # what tables in OpenSim's names that were given for something else are for
+    "/jointset/": "; the motion of joints is prescribed (--prescribe), or a table of states",
+    "/forceset/": "; these are muscles: give the table as excitation (--excitation)",
+}
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
@@ -148,7 +154,7 @@ def parse_pattern(text: str, seed: int = 0) -> Maker:
     """
     kind, _, rest = text.partition(":")
     if kind not in PATTERNS:
-        raise SignalError(f"'{text}' is not a pattern; patterns: {pattern_forms()}")
+        raise SignalError(f"'{text}' is not a pattern{_meant(text)}; patterns: {pattern_forms()}")
     form, fewest, most = PATTERNS[kind]
     parts = rest.replace("@", ",").split(",") if rest else []
     try:
@@ -184,6 +190,18 @@ def _maker(text: str, kind: str, numbers: list[float], seed: int) -> Maker:
     return lambda name, index, count: Wander((int(chosen), zlib.crc32(name.encode())), hold)
 
 
+def _meant(text: str) -> str:
+    """Return what to write in place of text that is not a pattern, if it is a number, a table or nearly a pattern."""
+    try:
+        return f"; for a level that stays write constant:{float(text):g}"
+    except ValueError:
+        if text.lower().endswith(SUFFIXES):
+            return (
+                "; a table drives the muscles of its columns: write its name alone, without NAME= before it"
+            )
+        return nearest(text.partition(":")[0], PATTERNS)
+
+
 def match_columns(table: Table, known: Sequence[str], what: str) -> dict[str, str]:
     """Return, for each column of a table, the name among `known` that it drives.
 
@@ -196,9 +214,10 @@ def match_columns(table: Table, known: Sequence[str], what: str) -> dict[str, st
     unknown = [column for column, name in found.items() if name not in known]
     if unknown:
         s = "s" * (len(unknown) != 1)
+        other = next((told for mark, told in _ELSEWHERE.items() if unknown[0].startswith(mark)), "")
         raise SignalError(
             f"{table.source}: no {what} for column{s} {', '.join(repr(n) for n in unknown)}; "
-            f"there are: {', '.join(known) or 'none'}"
+            f"there are: {', '.join(known) or 'none'}{other}"
         )
     for column, name in found.items():
         others = [other for other in found if other != column and found[other] == name]

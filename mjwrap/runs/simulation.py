@@ -21,6 +21,7 @@ from mjwrap.runs.engine import MODES, start_engine
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import INTEGRATORS, place_followers, set_state, start_keyframe
 from mjwrap.runs.prescribed_motion import PrescribedMotion, check_free
+from mjwrap.runs.pushing import Pushes
 from mjwrap.runs.run_table import DEFAULT_KINDS, RunTable
 from mjwrap.runs.table_spans import uncovered
 
@@ -102,6 +103,7 @@ class Simulation:
         check_levels(engine.muscles.model, self.excitation)
         self.prescribed = PrescribedMotion(engine.model, settings.prescribed, option=option)
         check_free(engine.model, self.prescribed.joints, settings.positions)
+        self.pushes = Pushes(engine.muscles)
         entries = (*settings.excitation, *settings.prescribed)
         if told := uncovered(entries, self.duration, self._timestep):
             warnings.warn(told, stacklevel=2)
@@ -174,6 +176,7 @@ class Simulation:
             started, outputs = time.perf_counter(), 0.0
             for k in range(steps):
                 if k % stride == 0:
+                    self.pushes.look(data)
                     outputs += self._sample(logs, compiling)
                     progress(0.0 if k == 0 else stride * timestep)
                 if stopped():
@@ -183,6 +186,7 @@ class Simulation:
                 self.prescribed.place(data)
                 self.excitation.write(data)
             else:
+                self.pushes.look(data)
                 outputs += self._sample(logs, compiling)
             return WallTime(time.perf_counter() - started - compiling.seconds - outputs, outputs)
 

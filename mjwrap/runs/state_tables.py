@@ -14,7 +14,7 @@ from mjwrap.errors import TableError
 from mjwrap.files import Table
 from mjwrap.mjcf import act_names, dof_names, name_of, qpos_names
 from mjwrap.mjcf.couplings import CoupledJoints
-from mjwrap.runs.angles import check_column
+from mjwrap.runs.angles import check_column, unit_taken
 from mjwrap.runs.excitation import control_names
 from mjwrap.runs.models import single_joints
 from mjwrap.runs.run_table import MUSCLE_KINDS
@@ -123,6 +123,7 @@ class _Reader:
         self.arrays["own"] = np.tile(branch[len(branch) - 2 * muscles.n :], (len(table.time), 1))
         self.found: dict[str, set[int]] = {kind: set() for kind in self.arrays}
         self.unused: list[str] = []
+        self._turned: dict[str, int] = {}  # joints by the columns of their positions
         self._muscles = set(muscles.names)
         self._joints = single_joints(model)
         self._hinges = {n for n, j in self._joints.items() if int(model.jnt_type[j]) == _HINGE}
@@ -159,6 +160,7 @@ class _Reader:
             if kind == "qpos" and turns:
                 joint = self._joints[self.names[kind][place]]
                 check_column(self.model, joint, self.table, column, own=column.startswith("qpos"))
+                self._turned[column] = joint
             self.found[kind].add(place)
             return
         self.unused.append(column)
@@ -190,7 +192,8 @@ class _Reader:
     def states(self) -> States:
         """Return the states; velocities that are missing are computed as differences."""
         arrays, model, time = self.arrays, self.model, self.table.time
-        remarks = []
+        unit = unit_taken(model, self.table, self._turned)
+        remarks = [unit] if unit else []
         placed = self._place_followers()
         if placed:
             remarks.append(

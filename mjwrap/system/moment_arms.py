@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 
 import mujoco
@@ -13,6 +12,8 @@ from mjwrap import validation
 from mjwrap.errors import GeometryError
 from mjwrap.mjcf import name_of, names
 from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.mjcf.names import listed
+from mjwrap.text import nearest
 
 Array = NDArray[np.float64]
 _JOINT = mujoco.mjtObj.mjOBJ_JOINT
@@ -57,9 +58,9 @@ def _dofs(model: mujoco.MjModel, couplings: CoupledJoints, coordinates: list[str
     found: list[int] = []
     for name in coordinates:
         if name not in known:
-            near = difflib.get_close_matches(str(name), known)
-            meant = f"did you mean {' or '.join(near)}" if near else f"joints: {', '.join(known) or 'none'}"
-            raise GeometryError(f"no joint '{name}' for a moment arm; {meant}")
+            raise GeometryError(
+                f"no joint '{name}' for a moment arm{nearest(name, known)}; joints: {listed(known)}"
+            )
         joint = known.index(name)
         if joint in couplings.leader:
             heads = [f"'{known[head]}'" for head in couplings.heads(joint)]

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 _SITE, _GEOM = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
 SHOWN = 500  # muscles in a notebook's table
 FEW = 6  # names in a repr
+UNEVALUATED = "not evaluated yet: call forward(data), or for the engine plugin mj_forward(model, data)"
 MOVED = 1e-12  # [m, 1] a smaller moment arm is none
 
 
@@ -38,6 +39,8 @@ class Muscles(Protocol):
     def n(self) -> int: ...
     @property
     def names(self) -> list[str]: ...
+    @property
+    def evaluated(self) -> bool: ...
     @property
     def time(self) -> float: ...
     @property
@@ -158,12 +161,14 @@ class MuscleView:
     def plot(self, axes: Any = None) -> Any:
         """Draw the path at the last evaluation in space with matplotlib, and return the axes.
 
-        axes: 3D axes to draw into; None for a new figure. Raises `MissingPackageError` without matplotlib.
+        axes: 3D axes to draw into; None for a new figure. Labels and errors as in `MuscleSystem.plot`.
         """
         marks = self.contact_points().reshape(-1, 3)
-        return plots.draw_paths([(self.name, self.points())], marks, [], axes)
+        return plots.draw_paths([(label(self._muscles, self.index), self.points())], marks, [], axes)
 
     def __repr__(self) -> str:
+        if not _evaluated(self._muscles):
+            return f"MuscleView({self.name!r}, {UNEVALUATED})"
         numbers = ", ".join(f"{name} {value}" for name, value in _numbers(self)[:4])
         return f"MuscleView({self.name!r}, {self.status.name}, {numbers})"
 
@@ -171,7 +176,9 @@ class MuscleView:
         law = self.parameters
         given = fields(law) if is_dataclass(law) else ()
         parameters = [(field.name, getattr(law, field.name)) for field in given]
-        facts = [("status", self.status.name), *_numbers(self), ("route", self.route), ("law", law.law)]
+        known = _evaluated(self._muscles)
+        facts = [("status", self.status.name), *_numbers(self)] if known else [("status", UNEVALUATED)]
+        facts += [("route", self.route), ("law", law.law)]
         kind = "cable" if pulls_as_cable(self._muscles.model, self.declaration) else "muscle"
         shown = html.facts([*facts, *parameters], f"{kind} {self.name}")
         points = self.points()
@@ -191,6 +198,17 @@ def _numbers(muscle: MuscleView) -> list[tuple[str, str]]:
         ("activation", f"{muscle.activation:.4g}"),
         ("fibre length", f"{muscle.fiber_length:.6g} m"),
     ]
+
+
+def label(muscles: Muscles, i: int) -> str:
+    """Return the label of a muscle in a picture: its name, and its status if it has no path.
+
+    Raises `StateError` before the first evaluation, when there is nothing to draw.
+    """
+    if not _evaluated(muscles):
+        raise StateError(f"there are no paths to draw: {UNEVALUATED}")
+    code, name = int(muscles.status[i]), muscles.names[i]
+    return f"{name} ({Status(code).name})" if code else name
 
 
 def pulls_as_cable(model: mujoco.MjModel, muscle: MuscleDeclaration) -> bool:
@@ -221,14 +239,20 @@ def route_text(model: mujoco.MjModel, route: Route) -> str:
 def system_text(muscles: Muscles) -> str:
     """Return a line about a system: its muscles, those without a path, and the actuators left to MuJoCo."""
     names = muscles.names
-    told = [", ".join(names[:FEW]) + ", ..." * (len(names) > FEW)] if names else []
+    told = [_few(names)] if names else []
+    if names and not _evaluated(muscles):
+        told.append(UNEVALUATED)
     failed = [name for name, code in zip(names, _status(muscles), strict=True) if code]
     if failed:
-        told.append(f"without a path: {', '.join(failed[:FEW])}{', ...' * (len(failed) > FEW)}")
+        told.append(f"without a path: {_few(failed)}")
     if muscles.native:
         told.append(f"{len(muscles.native)} left to MuJoCo")
     count = counted_paths(len(names), _cables(muscles))
     return f"{type(muscles).__name__}({count}{': ' * bool(told)}{'; '.join(told)})"
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:FEW]) + ", ..." * (len(names) > FEW)
 
 
 def system_html(muscles: Muscles) -> str:
@@ -236,15 +260,14 @@ def system_html(muscles: Muscles) -> str:
     first = "cable" if 0 < muscles.n == _cables(muscles) else "muscle"
     heads = (first, "law", "path", "length [m]", "velocity [m/s]", "tension [N]", "activation", "route")
     rows: list[list[str]] = []
+    known = _evaluated(muscles)
     status = _status(muscles)
-    try:
-        columns = [muscles.length, muscles.velocity, muscles.tension, muscles.activation]
-    except MjwrapError:  # of the plugin, before the first step
-        columns = [np.full(muscles.n, np.nan)] * 4
+    columns = [muscles.length, muscles.velocity, muscles.tension, muscles.activation] if known else []
     for i, muscle in enumerate(muscles.declarations[:SHOWN]):
         route = " | ".join(route_text(muscles.model, route) for route in muscle.routes)
-        path = Status(int(status[i])).name
-        rows.append([muscle.name, muscle.law, path, *(f"{column[i]:.5g}" for column in columns), route])
+        path = Status(int(status[i])).name if known else ""
+        numbers = [f"{column[i]:.5g}" for column in columns] or [""] * 4
+        rows.append([muscle.name, muscle.law, path, *numbers, route])
     found = html.table(heads, rows, system_text(muscles))
     if muscles.native:
         found += html.table(("left to MuJoCo", "reason"), list(muscles.native.items()))
@@ -252,7 +275,11 @@ def system_html(muscles: Muscles) -> str:
 
 
 def _status(muscles: Muscles) -> list[int]:
+    return muscles.status.tolist() if _evaluated(muscles) else [0] * muscles.n
+
+
+def _evaluated(muscles: Muscles) -> bool:
     try:
-        return muscles.status.tolist()
-    except MjwrapError:
-        return [0] * muscles.n
+        return muscles.evaluated
+    except MjwrapError:  # of the plugin's
+        return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import operator
 from collections.abc import Iterator
 from typing import Any, SupportsIndex
@@ -23,8 +22,9 @@ from mjwrap.model.arrays import Plan
 from mjwrap.model.kinematic_tree import last_dofs
 from mjwrap.paths import Status
 from mjwrap.system.history import History
-from mjwrap.system.muscle_view import MuscleView, system_html, system_text
+from mjwrap.system.muscle_view import MuscleView, label, system_html, system_text
 from mjwrap.system.state import Evaluation
+from mjwrap.text import nearest
 
 Array = NDArray[np.float64]
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
@@ -64,6 +64,12 @@ class Results:
     def names(self) -> list[str]:
         """Names of the muscles, in the order of all arrays."""
         return [muscle.name for muscle in self.declarations]
+
+    @property
+    def evaluated(self) -> bool:
+        """Whether the muscles have been evaluated since they were made or reset; before that all numbers are 0."""
+        state = self._evaluation()
+        return not self.n or bool(state.evaluated or state.count.any() or state.status.any())
 
     @property
     def length(self) -> Array:
@@ -171,9 +177,7 @@ class Results:
                 f"no muscle of the name {validation.described(name)}; muscles: {listed(names)}"
             )
         if name not in names:
-            near = difflib.get_close_matches(name, names, n=3)
-            meant = f"did you mean {' or '.join(near)}? " if near else ""
-            raise GeometryError(f"no muscle '{name}'; {meant}muscles: {listed(names)}")
+            raise GeometryError(f"no muscle '{name}'{nearest(name, names)}; muscles: {listed(names)}")
         return names.index(name)
 
     def __getitem__(self, muscle: str | SupportsIndex) -> MuscleView:
@@ -271,9 +275,11 @@ class Results:
     def plot(self, axes: Any = None) -> Any:
         """Draw all paths at the last evaluation in space with matplotlib, and return the axes.
 
-        axes: 3D axes to draw into; None for a new figure. Raises `MissingPackageError` without matplotlib.
+        A muscle without a path is drawn along its last valid one, and its label has its status. axes: 3D axes to draw
+        into; None for a new figure. Raises `MissingPackageError` without matplotlib, `GeometryError` for other axes,
+        and `StateError` before the first evaluation.
         """
-        paths = [(name, self.points(i)) for i, name in enumerate(self.names)]
+        paths = [(label(self, i), self.points(i)) for i in range(self.n)]
         return plots.draw_paths(paths, self.contacts()[0], [], axes)
 
     def contact_points(self, i: int) -> Array:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mjwrap import validation
 from mjwrap.errors import RecordingError
+from mjwrap.text import nearest
 
 MUSCLES = (
     "muscles"  # name of the camera that looks at the muscles, unless the model has a camera of this name
@@ -33,7 +34,9 @@ def find_camera(
     if number == MUSCLES:
         return None
     if isinstance(number, str) or not 0 <= number < model.ncam:
-        raise RecordingError(f"no camera {camera!r}; cameras: {', '.join([*names, MUSCLES])}")
+        raise RecordingError(
+            f"no camera {camera!r}{nearest(str(camera), names)}; cameras: {', '.join([*names, MUSCLES])}"
+        )
     found.type, found.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), int(number)
     return found
 

@@ -35,8 +35,10 @@ class Mistake(enum.StrEnum):
     TURNS_BACK = "route turns back"
     JOINT_RANGE = "joint range"
     KEYFRAME = "keyframe in degrees"
-    PARAMETER = "length of fibre or tendon"
+    PARAMETER = "parameter in another unit"
     UNITS = "units"
+    PUSHES = "cable pushes"
+    ACTUATION = "actuation off"
 
 
 @dataclass(frozen=True)

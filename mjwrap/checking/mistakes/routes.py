@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetres, muscle_of, quoted
+from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, muscle_of, quoted
+from mjwrap.checking.mistakes.parameters import parameter_mistakes
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf import MuscleDeclaration, Route, name_of
 from mjwrap.mjcf.actuators import is_muscle
@@ -18,7 +19,6 @@ from mjwrap.system import pulls_as_cable
 
 Array = NDArray[np.float64]
 SAME = 1e-6  # distance of stops that count as one place, as a share of the muscle's size
-OTHER_UNIT = 20.0  # least length of fibre or tendon that is not in metres, in sizes of the muscle
 SHARP = np.cos(np.radians(150.0))  # a route that turns by more at a via site goes back where it came from
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
@@ -83,23 +83,10 @@ def _of_route(posed: Posed, i: int, muscle: MuscleDeclaration, hints: bool) -> I
             f"found",
             "put the hint or side site where the muscle should touch",
         )
-    yield from _of_lengths(model, muscle, float(posed.sizes[i]))
+    yield from parameter_mistakes(model, muscle, float(posed.sizes[i]))
     for route in (r for r in muscle.routes if holds(model, r.when, posed.data.qpos)):
         yield from _of_stops(posed, i, muscle, route)
         yield from _of_side_sites(posed, muscle, route)
-
-
-def _of_lengths(model: mujoco.MjModel, muscle: MuscleDeclaration, size: float) -> Iterator[PossibleMistake]:
-    """Yield a finding for a length of fibre or tendon that is in another unit than the path."""
-    for name in ("optimal_fiber_length", "tendon_slack_length"):
-        length = getattr(muscle.parameters, name, None)
-        if length is not None and length > OTHER_UNIT * size:
-            yield PossibleMistake(
-                Mistake.PARAMETER,
-                muscle_of(model, muscle),
-                f"has a {name} of {millimetres(length)}, and its stops are only {millimetres(size)} apart",
-                "lengths are in metres",
-            )
 
 
 def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> Iterator[PossibleMistake]:
@@ -118,6 +105,14 @@ def _of_stops(posed: Posed, i: int, muscle: MuscleDeclaration, route: Route) -> 
                 "has stops at one place, one after the other: "
                 + (f"{names[a]} and {names[b]}" if names[a] != names[b] else f"{names[a]}, twice"),
                 "leave one of them out, or give the site its own position",
+            )
+    for stop, following in itertools.pairwise(stops):
+        if stop == following and stop[0] == "geom":
+            yield PossibleMistake(
+                Mistake.SAME_PLACE,
+                muscle_of(model, muscle),
+                f"wraps {quoted(model, *stop)} twice, one after the other",
+                "leave one of them out: a path touches a surface once, wherever it is listed",
             )
     straights = posed.straights(i) if posed.found[i] else np.empty((0, 2, 3))
     for k in sites[1:-1]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mjwrap.checking.mistakes.actuators import actuator_mistakes
 from mjwrap.checking.mistakes.arms import moment_arm_mistakes, sign_changes
 from mjwrap.checking.mistakes.finding import PossibleMistake
 from mjwrap.checking.mistakes.joints import joint_mistakes
@@ -32,7 +33,7 @@ def possible_mistakes(
         hints: also find hints that are not met at the pose. Without it nothing has to be compiled after an evaluation.
 
     Returns:
-        The findings: first of elements that nothing reads, then of joints, surfaces, routes and moment arms.
+        The findings: first of elements that nothing reads, then of joints, actuators, surfaces, routes and moment arms.
 
     Raises:
         StateError: the pose is not possible.
@@ -48,6 +49,7 @@ def possible_mistakes(
 def _search(posed: Posed, sweep: bool, hints: bool) -> Iterator[PossibleMistake]:
     yield from unread_elements(posed.model)
     yield from joint_mistakes(posed)
+    yield from actuator_mistakes(posed)
     yield from surface_mistakes(posed)
     yield from route_mistakes(posed, hints)
     yield from moment_arm_mistakes(posed)

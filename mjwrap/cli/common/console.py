@@ -17,6 +17,7 @@ from mjwrap.cli.common.errors import RUN_FAILED, USER_ERROR, RunError, UserError
 from mjwrap.cli.common.output import discard_outputs
 from mjwrap.cli.common.stopping import Stopped, stoppable
 from mjwrap.errors import GeometryError, MjwrapError, ModelError, SignalError
+from mjwrap.text import nearest
 
 _SUFFIXES = (".xml", ".mjb", ".rrd", ".sto", ".mot", ".csv", ".npz")
 _MYO_NOISE = (
@@ -54,9 +55,15 @@ class _Help(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser with one-line errors, whose help is the module docstring of the command, examples last."""
+    """A parser with one-line errors, whose help is the module docstring of the command, examples last.
 
-    def __init__(self, name: str, documentation: str) -> None:
+    elsewhere: returns the commands that have an option, for the message about one that this command lacks.
+    """
+
+    def __init__(
+        self, name: str, documentation: str, elsewhere: Callable[[str], list[str]] | None = None
+    ) -> None:
+        self._elsewhere = elsewhere
         what, mark, examples = documentation.partition("\nExamples:")
         super().__init__(
             prog=name,
@@ -82,7 +89,24 @@ class Parser(argparse.ArgumentParser):
                 following.lower().endswith(_SUFFIXES) or following.startswith(("mjwrap:", "myo_sim:"))
             ):
                 given[i] = f"{word}={optional[word]}"
-        return super().parse_args(given, namespace)
+        found, unknown = self.parse_known_args(given, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._meant(unknown)}")
+        return found
+
+    def options(self) -> list[str]:
+        """Return the options of the command."""
+        return [flag for action in self._actions for flag in action.option_strings]
+
+    def _meant(self, unknown: list[str]) -> str:
+        """Return what resembles the first option that does not exist, or which commands have it."""
+        option = next((word.partition("=")[0] for word in unknown if word.startswith("--")), "")
+        having = self._elsewhere(option) if option and self._elsewhere else []
+        if having:
+            return (
+                f"; {' and '.join(having)} {'has' if len(having) == 1 else 'have'} {option}, not {self.prog}"
+            )
+        return nearest(option, self.options()) if option else ""
 
     def format_help(self) -> str:
         """Return the help: the usage line names the required arguments only, the list below all of them."""

@@ -34,7 +34,7 @@ from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.runs.state_tables import read_states
 from mjwrap.system import CableSystem
-from mjwrap.text import counted, counted_paths
+from mjwrap.text import counted, counted_paths, nearest
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def compare(settings: CompareSettings) -> int:
             seed=settings.seed,
             side_rule=settings.side_rule,
         )
-        tell_motion(report.say, motion, changed, settings.excitation)
+        tell_motion(report.say, motion, changed, settings.excitation, found.unlike)
     if plot is not None:
         from mjwrap.cli.compare.plot import plot_comparison
 
@@ -200,6 +200,6 @@ def choose(muscles: MuscleSystem, wanted: Sequence[str] | None) -> list[str] | N
     for pattern in wanted:
         fit = [name for name in fnmatch.filter(known, pattern) if name not in found]
         if not fit and pattern not in found:
-            raise UserError(f"no muscle '{pattern}'; muscles: {', '.join(known)}")
+            raise UserError(f"no muscle '{pattern}'{nearest(pattern, known)}; muscles: {', '.join(known)}")
         found += fit
     return found

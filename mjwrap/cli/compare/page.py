@@ -18,7 +18,7 @@ import mujoco
 
 import mjwrap
 from mjwrap.cli.compare.plot import COLOURS, draw_motion, draw_sweep
-from mjwrap.cli.compare.text import TITLES, millimetres, starred, where
+from mjwrap.cli.compare.text import TITLES, millimetres, starred, unlike_routes, where
 from mjwrap.comparison import (
     AGREE,
     Jump,
@@ -66,7 +66,7 @@ def write_page(
         agree=f"{AGREE:g}",
         muscles=[_muscle(s, found, verdicts[name]) for name, s in found.muscles.items()],
         tables=_tables(tables),
-        motion=_motion(motion) if motion is not None and motion.difference.size else None,
+        motion=_motion(motion, found.unlike) if motion is not None and motion.difference.size else None,
         left_out=found.left_out,
         counted=counted,
     )
@@ -179,13 +179,15 @@ def _tables(tables: Sequence[TableDifference]) -> list[list[str]]:
     ]
 
 
-def _motion(motion: MotionDifference) -> dict[str, str]:
+def _motion(motion: MotionDifference, unlike: Sequence[str]) -> dict[str, str]:
     dof, gap, when = motion.worst()
     last, final = motion.final()
     told = (
         f"Over {motion.time[-1]:g} s the largest difference of mjwrap from MuJoCo is {gap:+.3g} {motion.unit(dof)} "
         f"({dof}, at {when:g} s); at the end it is {final:+.3g} {motion.unit(last)} ({last}). {motion.stopped}"
     )
+    if unlike:
+        told = f"{unlike_routes(unlike)}. {told}"
     figure, pair = plt.subplots(1, 2, figsize=(10.0, 2.8), layout="constrained")
     draw_motion(pair, motion)
     return {"told": told, "paths": motion.paths, "drawing": _svg(figure)}

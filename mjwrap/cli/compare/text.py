@@ -131,12 +131,24 @@ def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
     say("\n".join(aligned(rows, (0, 1, 2))))
 
 
-def tell_motion(say: Say, motion: MotionDifference, changed: list[str], entries: Sequence[str]) -> None:
-    """Print the differences between the two simulations."""
+def unlike_routes(names: Sequence[str]) -> str:
+    """Return a remark on muscles that MuJoCo pulls along another route, or not at all."""
+    return f"MuJoCo's simulation has another route, or no tendon, for {', '.join(names)}: the motions must differ"
+
+
+def tell_motion(
+    say: Say, motion: MotionDifference, changed: list[str], entries: Sequence[str], unlike: Sequence[str]
+) -> None:
+    """Print the differences between the two simulations.
+
+    changed: muscles whose law was replaced; unlike: those that MuJoCo pulls along another route, or not at all.
+    """
     say(f"\nsimulation over {motion.time[-1]:g} s, excitation {' '.join(entries)}; mjwrap minus MuJoCo")
     if changed:
         those = counted(len(changed), "muscle")
         say(f"  {those} with another law: MuJoCo's curves in both (--law declared: their own law)")
+    if unlike:
+        say(f"  {unlike_routes(unlike)}")
     dof, gap, when = motion.worst()
     last, final = motion.final()
     if dof:

@@ -19,7 +19,7 @@ from mjwrap.cli.common.output import Report
 from mjwrap.cli.inspect.cables import cable_rows, cable_table
 from mjwrap.cli.inspect.declared import as_values, table
 from mjwrap.cli.inspect.moment_arms import arms_table, moment_arms
-from mjwrap.runs.angles import check_range
+from mjwrap.poses.angles import check_range
 from mjwrap.runs.models import load, single_joints, start_keyframe, start_state
 from mjwrap.system import CableSystem, MuscleSystem, is_cable
 from mjwrap.text import counted, counted_paths
@@ -55,7 +55,7 @@ def inspect(settings: InspectSettings) -> int:
     )  # read first, so that a mistake in a range is reported before the work
     for name, (low, high) in joints.items():
         if name in (single := single_joints(model)):
-            check_range(model, single[name], low, high)
+            check_range(model, single[name], low, high, f"{name}={low:g}deg,{high:g}deg")
     report = Report(settings.json)
     muscles = CableSystem(model, side_rule=settings.side_rule)
     if not muscles.names and not muscles.native:

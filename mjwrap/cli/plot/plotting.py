@@ -17,7 +17,7 @@ from mjwrap.cli.common.output import open_output, say
 from mjwrap.cli.plot.model_curves import ModelCurves, shown_unit, write_curves
 from mjwrap.errors import ModelError
 from mjwrap.poses import JointCurves, curves
-from mjwrap.runs.angles import check_range
+from mjwrap.poses.angles import check_range
 from mjwrap.runs.models import find_joint, load, start_keyframe, start_state
 from mjwrap.text import aligned, counted_paths
 
@@ -100,7 +100,8 @@ def _curves(settings: PlotSettings, source: str, joint: str) -> JointCurves:
     pose = start_state(model, start_keyframe(model, settings.keyframe), settings.positions).qpos
     try:
         if settings.span is not None:
-            check_range(model, find_joint(model, joint, joint), *settings.span)
+            low, high = settings.span
+            check_range(model, find_joint(model, joint, joint), low, high, f"{low:g}deg,{high:g}deg")
         return curves(
             model,
             joint,

@@ -13,6 +13,7 @@ from mjwrap.system import CableSystem, MuscleSystem
 from mjwrap.text import counted
 
 MOST = 6  # joints of which the position is told
+LEFT = 0.05  # of its range; limits are soft, and a joint that rests on one is a little outside
 STILL = 1e-6  # [rad, m] largest change of the position of a joint that has not moved
 UNSAVED = (
     "nothing was saved: --plot FILE.png draws curves, --record FILE.rrd keeps a recording, --video FILE.gif a film, "
@@ -24,12 +25,15 @@ def ended(simulation: Simulation) -> str:
     """Return the time and the positions of the joints at the end, at most `MOST` of them: those that moved most.
 
     Hinges in degrees, slides in mm, balls by the angle from the reference [degrees], free joints by their place [mm].
+    With its range, if a joint has left it by more than `LEFT`.
     """
     model, data = simulation.engine.model, simulation.engine.data
     moved = _changes(model, simulation.start, data.qpos)
     chosen = sorted(sorted(range(model.njnt), key=lambda j: -moved[j])[:MOST])
     parts = [
-        f"{name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j)} {_position(model, data.qpos, j)}" for j in chosen
+        f"{name_of(model, mujoco.mjtObj.mjOBJ_JOINT, j)} {_position(model, data.qpos, j)}"
+        + _outside(model, data.qpos, j)
+        for j in chosen
     ]
     rest = f" (of {counted(model.njnt, 'joint')} those that moved most)" if model.njnt > MOST else ""
     return f"ended at {data.time:.6g} s{' with ' * bool(parts)}{', '.join(parts)}{rest}"
@@ -131,6 +135,19 @@ def _position(model: mujoco.MjModel, qpos: NDArray[np.float64], joint: int) -> s
     if kind == int(mujoco.mjtJoint.mjJNT_BALL):
         return f"{_rounded(np.degrees(_angle(np.array([1.0, 0.0, 0.0, 0.0]), qpos[adr : adr + 4])), 1)}°"
     return f"({', '.join(f'{_rounded(1e3 * x, 1):g}' for x in qpos[adr : adr + 3])}) mm"
+
+
+def _outside(model: mujoco.MjModel, qpos: NDArray[np.float64], joint: int) -> str:
+    """Return a remark on a hinge or slide that is clearly outside its range, else ""."""
+    kind, adr = int(model.jnt_type[joint]), int(model.jnt_qposadr[joint])
+    if kind not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
+        return ""
+    low, high = model.jnt_range[joint].tolist()
+    if not model.jnt_limited[joint] or not max(low - qpos[adr], qpos[adr] - high) > LEFT * (high - low) > 0.0:
+        return ""
+    ends = np.zeros((2, model.nq))
+    ends[:, adr] = low, high
+    return f", outside its range of {' to '.join(_position(model, end, joint) for end in ends)}"
 
 
 def _rounded(value: float, digits: int) -> float:

@@ -129,6 +129,8 @@ def tell(
     wall = spent.simulation
     rate = f"simulated {simulated:.6g} s in {wall:.3g} s: {simulated / max(wall, 1e-9):.3g} times real time"
     report.say(rate + (f"; {spent.outputs:.3g} s for the files" if spent.outputs > 0.05 * wall else ""))
+    for remark in simulation.prescribed.remarks:
+        report.say(remark)
     if not muscles.n and not muscles.native:
         report.say("the model declares no muscle for mjwrap; MuJoCo alone simulated it")
     if muscles.native:
@@ -140,6 +142,8 @@ def tell(
         report.say("muscles without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
+    if sentence := simulation.pushes.told():
+        report.say(sentence)
     report.say(ended(simulation))
     if sentence := undriven(simulation):
         report.say(sentence)
@@ -167,6 +171,7 @@ def facts(
         "simulated": float(engine.data.time),
         "positions": positions(simulation),
         "undriven": undriven(simulation),
+        "pushes": simulation.pushes.found(),
         "wall": spent.simulation,
         "wall_files": spent.outputs,
         "stopped_by": stopped.name if stopped else None,

@@ -116,7 +116,9 @@ def written_inertias(bodies: tuple[Body, ...], branches: list[Branch]) -> dict[s
         elif branch.fixed or properties.physical:
             out[name] = Written(properties)
         else:
-            out[name] = _nearest(properties, (SMALLEST if branch.copy_of or name in by_name else FRAME) * total)
+            out[name] = _nearest(
+                properties, (SMALLEST if branch.copy_of or name in by_name else FRAME) * total
+            )
     return out
 
 

@@ -16,7 +16,9 @@ def quaternion(rotation: Array) -> Array | None:
     square = 0.25 * np.array([1.0 + trace, *(1.0 - trace + 2.0 * np.diag(rotation))])
     largest = int(np.argmax(square))
     found = np.empty(4)
-    skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    skew = np.array(
+        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
+    )
     even = rotation + rotation.T
     if largest == 0:
         found[0], found[1:] = 4.0 * square[0], skew
