@@ -1,7 +1,7 @@
 """Numbers that compiled code reads by their address: the curves of muscles that have their own.
 
 A muscle's own curves stand in arrays that Python keeps (`mjwrap/muscles/curve_sets.py`). Their address takes the place
-of the law's code in the functions of `dispatch.py`, so that a muscle without curves of its own pays nothing for them.
+of the law's code in the functions of `dispatch.py`, so that a muscle without curves of its own pays a comparison.
 """
 
 from __future__ import annotations
