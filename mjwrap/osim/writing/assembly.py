@@ -51,7 +51,10 @@ class Poses:
         if isinstance(constraint, PointConstraint):
             return np.asarray(first[:3, 3] - second[:3, 3], dtype=np.float64)
         if isinstance(constraint, DistanceConstraint):
-            return np.array([np.linalg.norm(first[:3, 3] - second[:3, 3]) - constraint.distance])
+            return np.asarray(
+                np.array([np.linalg.norm(first[:3, 3] - second[:3, 3]) - constraint.distance]),
+                dtype=np.float64,
+            )
         return _difference(first, second)
 
     @staticmethod
