@@ -19,10 +19,12 @@ from mjwrap.osim.description.functions import Array
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.writing.drivers import Drivers
 from mjwrap.osim.writing.motions import Values, evaluated, placed
+from mjwrap.osim.writing.rotations import quaternion
 from mjwrap.osim.writing.tree import Branch
 
 FREE = 1e3  # how much farther a coordinate moves that the file lets move to satisfy constraints
 STEP = 1e-6
+EXACT, SETTLED = 1e-13, 1e-10  # [m, rad] errors of constraints, and the last step of a coordinate
 
 
 class Poses:
@@ -47,7 +49,7 @@ class Poses:
             return np.array([axis @ offset for axis in self.across(constraint.direction)])
         first, second = self.frame(constraint.first), self.frame(constraint.second)
         if isinstance(constraint, PointConstraint):
-            return first[:3, 3] - second[:3, 3]
+            return np.asarray(first[:3, 3] - second[:3, 3], dtype=np.float64)
         if isinstance(constraint, DistanceConstraint):
             return np.array([np.linalg.norm(first[:3, 3] - second[:3, 3]) - constraint.distance])
         return _difference(first, second)
@@ -57,15 +59,21 @@ class Poses:
         """Return two unit vectors (3,) that are perpendicular to a direction and to each other."""
         unit = direction / np.linalg.norm(direction)
         first = np.cross(unit, np.eye(3)[int(np.argmin(np.abs(unit)))])
-        first /= np.linalg.norm(first)
-        return [first, np.cross(unit, first)]
+        first = np.asarray(first / np.linalg.norm(first), dtype=np.float64)
+        return [first, np.asarray(np.cross(unit, first), dtype=np.float64)]
 
 
 def _difference(first: Array, second: Array) -> Array:
-    """Return the errors (6,) of two poses that have to be equal: position, and sines of the small angles between."""
+    """Return the errors (6,) of two poses that have to be equal: position, and the rotation vector between them."""
     turn = first[:3, :3].T @ second[:3, :3]
-    angles = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    return np.concatenate([first[:3, 3] - second[:3, 3], angles])
+    quat = quaternion(turn)
+    if quat is None:
+        return np.concatenate([first[:3, 3] - second[:3, 3], np.zeros(3)])
+    sine = float(np.linalg.norm(quat[1:]))
+    angle = 2.0 * np.arctan2(sine, abs(quat[0])) * (1.0 if quat[0] >= 0.0 else -1.0)
+    return np.concatenate(
+        [first[:3, 3] - second[:3, 3], angle / sine * quat[1:] if sine > 0.0 else np.zeros(3)]
+    )
 
 
 def residuals(model: OsimModel, branches: list[Branch], values: Values) -> Array:
@@ -106,19 +114,20 @@ def assemble(model: OsimModel, branches: list[Branch], drivers: Drivers) -> None
         drivers.settle(start | dict(zip(names, map(float, q), strict=True)))
         return residuals(model, branches, drivers.value)
 
-    best, q = home, home
+    q: Array = home
+    best: Array = home
     smallest = np.inf
     for _ in range(60):
         error = errors(q)
         size = float(np.abs(error).max())
-        if size < smallest:
+        if size < max(smallest, EXACT):
             best, smallest = q, size
         columns = [(errors(q + step) - errors(q - step)) / (2.0 * STEP) for step in STEP * np.eye(len(q))]
         slopes = np.stack(columns, axis=1)
         wanted, *_ = np.linalg.lstsq(slopes * ease, slopes @ (q - home) - error, rcond=1e-8)
         step = home + ease * wanted - q
-        if size < 1e-14 or (size < 1e-10 and float(np.abs(step).max()) < 1e-14):
+        if size < EXACT and float(np.abs(step).max()) < SETTLED:
             break
         largest = float(np.abs(step).max())
-        q = q + step * min(1.0, 1.0 / largest if largest > 0.0 else 1.0)
+        q = np.asarray(q + step * min(1.0, 1.0 / largest if largest > 0.0 else 1.0), dtype=np.float64)
     errors(best)

@@ -95,7 +95,7 @@ def write_constraints(document: Document, model: OsimModel, report: Report, skel
                 own = Frame(branch.body, np.zeros(3), np.eye(3))
                 writer.between("weld", name, Frame(branch.copy_of, np.zeros(3), np.eye(3)), own)
             report.add(branch.joint.kind, branch.joint.name, EXACT,
-                       f"closes a loop: '{branch.copy_of}' is carried in equal parts by its joints, welded together")  # fmt: skip
+                       f"closes a loop: '{branch.copy_of}' is carried in equal parts by welded copies")  # fmt: skip
     for constraint in model.constraints:
         if not isinstance(constraint, Coupler):
             _write(writer, constraint, poses)

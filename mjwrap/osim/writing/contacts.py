@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 from mjwrap.osim.description.bodies import Mesh
@@ -23,7 +22,7 @@ from mjwrap.osim.writing.skeleton import Skeleton
 from mjwrap.osim.writing.unique_names import UniqueNames
 from mjwrap.osim.writing.vtp import MeshError
 
-IMPEDANCE = 0.9
+IMPACT = 1.0  # [m/s] at which the restitution is that of the file
 HALF_SPACE = "ContactHalfSpace"
 WIDTH = 10.0  # [m] half the width of the box for a half-space that moves
 
@@ -102,20 +101,30 @@ class _Writer:
                 continue
             inverse = inverse_mass[bodies[0]] + inverse_mass[bodies[1]]
             law = _law(force, first, second, self.weight)
-            stiffness = min(law.stiffness * (1.0 - IMPEDANCE) * inverse, 0.2 / TIMESTEP**2)
-            damping = min(
-                max(law.damping * (1.0 - IMPEDANCE) * inverse, 0.1 * stiffness**0.5), 0.9 / TIMESTEP
-            )
             friction = law.friction
+            # Four rows of a pyramid are as stiff as one row with this share of its regularization. With the impedance
+            # below, a contact pushes half by its spring, half against what accelerates the body.
+            share = 0.5 * friction**2 * (1.0 + friction**2) if friction > 0.0 else 1.0
+            impedance = share / (1.0 + share)
+            stiffness = min(law.stiffness * inverse, 0.2 / TIMESTEP**2)
+            damping = min(4.0 * law.damping_ratio * (0.5 * stiffness) ** 0.5, 0.9 / TIMESTEP)
             rough = friction > 0.0
-            self.document.add("contact", "pair", geom1=first.geom, geom2=second.geom, solref=(-stiffness, -damping),
-                              solimp=(IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2), condim=3 if rough else 1,
-                              friction=(friction, friction, 0.005, 0.0001, 0.0001) if rough else None)  # fmt: skip
+            self.document.add(
+                "contact",
+                "pair",
+                geom1=first.geom,
+                geom2=second.geom,
+                solref=(-stiffness * impedance, -damping * impedance),
+                solimp=(impedance, impedance, 0.001, 0.5, 2),
+                condim=3 if rough else 1,
+                friction=(friction, friction, 0.005, 0.0001, 0.0001) if rough else None,
+            )
             written += 1
             text = (
                 f"'{first.shape.name}' and '{second.shape.name}': a linear spring and damper in MuJoCo, as stiff as "
                 f"the file's force at the model's weight, {self.weight:.4g} N, where the indentation is "
-                f"{1e3 * law.indentation:.3g} mm; friction {friction:.3g}, the dynamic one; no static, no viscous one"
+                f"{1e3 * law.indentation:.3g} mm, and with its restitution at {IMPACT:g} m/s; friction {friction:.3g}, "
+                f"the dynamic one; no static, no viscous one"
             )
             self.report.add(force.kind, force.name, APPROXIMATED, text)
         if not written:
@@ -130,7 +139,7 @@ class _Writer:
 @dataclass(frozen=True)
 class _Law:
     stiffness: float  # [N/m] load by indentation at the load
-    damping: float  # [N s/m] at the load
+    damping_ratio: float  # of the linear spring and damper with the restitution at the speed IMPACT
     indentation: float  # [m] at the load
     friction: float
 
@@ -155,8 +164,10 @@ def _law(force: HuntCrossley, first: _Shape, second: _Shape, load: float) -> _La
     frictions = [part.get("dynamic_friction", 0.0) for part in parts]
     total = sum(frictions)
     friction = 2.0 * frictions[0] * frictions[1] / total if total > 0.0 else 0.0
-    damping = 1.5 * load * (dissipation[0] * share + dissipation[1] * (1.0 - share))
-    return _Law(load / indentation, damping, indentation, friction)
+    # Hunt and Crossley's restitution falls from 1 as 1 - c v; 1 / (1 + c v) does so too, and stays positive.
+    mixed = dissipation[0] * share + dissipation[1] * (1.0 - share)
+    bounce = float(np.log1p(mixed * IMPACT))
+    return _Law(load / indentation, bounce / float(np.hypot(np.pi, bounce)), indentation, friction)
 
 
 def write_contacts(
@@ -170,8 +181,8 @@ def write_contacts(
     forces = [force for force in model.forces if isinstance(force, HuntCrossley)]
     if not forces:
         return
-    compiled = mujoco.MjModel.from_xml_string(document.to_xml(), document.assets)
-    names = {body: "world" if body == "ground" else body for body in document.bodies}
+    compiled = document.compile()
+    names = {body: element.get("name", "world") for body, element in document.bodies.items()}
     inverse_mass = {
         body: float(compiled.body_invweight0[compiled.body(name).id, 0]) for body, name in names.items()
     }

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.etree import ElementTree
 
+import mujoco
+
+from mjwrap.errors import OsimError
+
 SECTIONS = ("compiler", "option", "size", "asset", "worldbody", "deformable", "contact", "equality", "tendon",
             "actuator", "sensor", "custom", "keyframe")  # fmt: skip
 
@@ -46,6 +50,17 @@ class Document:
         """Add a numeric to `custom`; return its name."""
         self.add("custom", "numeric", name=name, data=list(data))
         return name
+
+    def compile(self) -> mujoco.MjModel:
+        """Return the model as it is so far, compiled.
+
+        Raises:
+            OsimError: MuJoCo refuses it; the message says why.
+        """
+        try:
+            return mujoco.MjModel.from_xml_string(self.to_xml(), self.assets)
+        except ValueError as error:
+            raise OsimError(f"MuJoCo does not accept the model: {error}") from None
 
     def to_xml(self) -> str:
         """Return the text of the model."""

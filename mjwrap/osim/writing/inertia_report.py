@@ -21,11 +21,11 @@ def report_inertias(document: Document, report: Report, skeleton: Skeleton) -> N
     moments of the file: written into `model.body_inertia` after compilation they undo the change.
     """
     changed = {name: written for name, written in skeleton.inertias.items() if written.original is not None}
-    model = mujoco.MjModel.from_xml_string(document.to_xml()) if changed else None
+    model = document.compile() if changed else None
     for branch in skeleton.branches:
         written = skeleton.inertias[branch.body]
         if branch.body in changed and model is not None:
-            effect = _effect(model, branch.body, written)
+            effect = _effect(model, document.bodies[branch.body].get("name", ""), written)
             _report_changed(document, report, branch.body, written, effect)
         elif written.joined_to:
             report.add("Body", branch.body, EXACT, f"its mass is counted with '{written.joined_to}', to which it is "

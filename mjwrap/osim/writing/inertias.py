@@ -12,6 +12,7 @@ from mjwrap.osim.writing.motions import evaluated
 from mjwrap.osim.writing.tree import Branch
 
 SMALLEST = 1e-9  # the least mass of a moving body, as a share of the model's mass
+FRAME = 1e-12  # the same for a frame of a joint, which always carries a body
 RADIUS = 0.1  # [m] the least inertia is that of the least mass at this distance
 
 
@@ -115,7 +116,7 @@ def written_inertias(bodies: tuple[Body, ...], branches: list[Branch]) -> dict[s
         elif branch.fixed or properties.physical:
             out[name] = Written(properties)
         else:
-            out[name] = _nearest(properties, SMALLEST * total)
+            out[name] = _nearest(properties, (SMALLEST if branch.copy_of or name in by_name else FRAME) * total)
     return out
 
 

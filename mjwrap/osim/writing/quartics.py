@@ -105,8 +105,8 @@ class _Inverse:
         for _ in range(5):
             step = step - (polyval(step, self._row) - x) / polyval(step, self._slope)
         if derivative:
-            return polyval(step, self._outer_slope) / polyval(step, self._slope)
-        return polyval(step, self._outer)
+            return np.asarray(polyval(step, self._outer_slope) / polyval(step, self._slope), dtype=np.float64)
+        return np.asarray(polyval(step, self._outer), dtype=np.float64)
 
 
 class _Made:
@@ -128,17 +128,19 @@ class _Made:
 
     def fit(self, function: Smooth, left: float, start: float, stop: float) -> None:
         """Add quartics that follow a function from `start` to `stop`; the first one holds from `left` on."""
-        count = 1
+        ends = np.array([start, stop])
         while True:
-            ends = np.linspace(start, stop, count + 1)
-            middles, rows, error = _quartics(function, ends)
-            if error <= self.tolerance or count >= MOST_PIECES:
+            middles, rows, errors = _quartics(function, ends)
+            if errors.max() <= self.tolerance or len(middles) >= MOST_PIECES:
                 break
-            # The error falls with the fifth power of the width.
-            count = min(max(count + 1, int(count * (error / self.tolerance) ** 0.2) + 1), MOST_PIECES)
-        for k in range(count):
+            # An error falls with the fifth power of the width.
+            parts = np.clip((errors / self.tolerance) ** 0.2 + 1.0, 1.0, 8.0).astype(int)
+            parts[errors <= self.tolerance] = 1
+            cut = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends[:-1], ends[1:], parts, strict=True)]
+            ends = np.concatenate([*cut, ends[-1:]])
+        for k in range(len(middles)):
             self.add(float(ends[k]) if k else left, float(middles[k]), rows[k])
-        self.worst = max(self.worst, error)
+        self.worst = max(self.worst, float(errors.max()))
 
     def function(self, kind: str, error: float) -> Piecewise:
         """Return the function that the pieces make."""
@@ -148,8 +150,8 @@ class _Made:
         return Piecewise(np.array(self.breaks), np.array(self.origins), padded, kind, max(error, self.worst))
 
 
-def _quartics(function: Smooth, ends: Array) -> tuple[Array, Array, float]:
-    """Return middles (n,) of intervals between ends (n + 1,), quartics about them (n, 5), and their largest error."""
+def _quartics(function: Smooth, ends: Array) -> tuple[Array, Array, Array]:
+    """Return middles (n,) of intervals between ends (n + 1,), quartics about them (n, 5), and their errors (n,)."""
     middles, half = 0.5 * (ends[:-1] + ends[1:]), 0.5 * np.diff(ends)
     values, slopes, at_middle = function(ends), function(ends, 1), function(middles)
     even = 0.5 * (values[:-1] + values[1:]) - at_middle
@@ -164,4 +166,4 @@ def _quartics(function: Smooth, ends: Array) -> tuple[Array, Array, float]:
     found = np.zeros_like(steps)
     for k in range(DEGREE, -1, -1):
         found = found * steps + rows[:, k : k + 1]
-    return middles, rows, float(np.abs(found - wanted).max())
+    return middles, rows, np.abs(found - wanted).max(axis=1)

@@ -72,7 +72,7 @@ class _Writer:
         element = self.document.add(
             self.document.bodies[branch.parent],
             "body",
-            name=branch.body,
+            name=branch.body if branch.body != "world" else "world_",  # MuJoCo's name of ground
             pos=home[:3, 3],
             quat=quaternion(home[:3, :3]),
         )

@@ -42,9 +42,8 @@ class Plane:
 class Branch:
     """A body with the joint that carries it; `chain` is its motion in its parent, another body or ground.
 
-    The body may be a frame between two bodies of the file that needs one of its own.
-        copy_of: the body that this one is part of, where the joint closes a loop; empty otherwise. backward: whether the
-        joint's child is the parent here.
+    The body may be a frame between two bodies of the file that needs one of its own. copy_of: the body that this one is
+    part of, where the joint closes a loop; empty otherwise. backward: whether the joint's child is the parent here.
     """
 
     body: str
