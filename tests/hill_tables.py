@@ -26,7 +26,7 @@ LAWS: dict[str, type[mw.DeGrooteFregly2016] | type[mw.Millard2012]] = {
     "millard": mw.Millard2012,
 }
 # Parameters of a Millard muscle with curves of its own, in OpenSim's order.
-OWN_CURVES: dict[str, tuple[float, ...]] = {
+OWN_CURVES: dict[str, Any] = {
     "active_force_length_curve": (0.35, 0.7, 1.7, 0.9, 0.05),
     "force_velocity_curve": (0.05, 0.3, 4.0, 0.06, 0.2, 1.5, 0.5, 0.8),
     "fiber_force_length_curve": (-0.05, 0.55, 0.15, 5.0, 0.6),

@@ -18,8 +18,12 @@ from mjwrap.mjcf import read_declarations, read_model
 SITES = "origin, elbow_side, elbow_inside, via, middle, ball_side, wrist_side, insertion"
 SURFACES = "elbow, egg, ulna, ball, palm, wrist"
 NUMERICS = (
-    "max_isometric_force, optimal_fiber_length, tendon_slack_length, pennation_angle, max_contraction_velocity, "
-    "fiber_damping, activation_time_constants, activation_smoothing, optimal_force"
+    "max_isometric_force, optimal_fiber_length, tendon_slack_length, pennation_angle, "
+    "max_contraction_velocity, fiber_damping, minimum_activation, max_pennation, "
+    "activation_time_constants, activation_smoothing, active_force_length_curve, force_velocity_curve, "
+    "fiber_force_length_curve, tendon_force_length_curve, optimal_force, max_tendon_strain, "
+    "max_fiber_strain, active_shape, passive_shape, velocity_shape, max_lengthening_force, "
+    "velocity_extrapolation, pcsa_force, resting_length, ligament_curve, stiffness, dissipation"
 )
 PULLEY = '<pulley divisor="2"/><site site="via"/><site site="insertion"/></spatial>'
 ACTUATOR = [element("actuator", "extensor")]
@@ -121,8 +125,8 @@ def test_a_path_actuator_without_a_force() -> None:
 
 
 def test_an_unknown_numeric() -> None:
-    text = tuple_message(*ACTUATOR, values=HILL | {"stiffness": 3.0})
-    assert "numeric 'mjwrap_m_stiffness' must contain exactly one of these in its name" in text
+    text = tuple_message(*ACTUATOR, values=HILL | {"flexibility": 3.0})
+    assert "numeric 'mjwrap_m_flexibility' must contain exactly one of these in its name" in text
     assert NUMERICS in text
 
 

@@ -28,7 +28,8 @@ def cases(name: str, tendon: str) -> list[tuple[int, Vector, Vector, Vector, lis
     for muscle in FROZEN["sets"][name]:
         given = dict(muscle["parameters"])
         times = given.pop("times")
-        law: Any = LAWS[muscle["law"]](**given, tendon=tendon)
+        kind: Any = LAWS[muscle["law"]]
+        law = kind(**given, tendon=tendon)
         states, results = np.array(muscle["states"]), np.array(muscle["results"], dtype=float)
         found.append((law.code, np.array([parameter_row(law)]), states, results, times))
     return found
@@ -42,7 +43,7 @@ def test_tension_with_a_rigid_tendon(name: str) -> None:
     elastic tendon, so that the tension is that one's.
     """
     for code, params, states, results, _ in cases(name, "rigid"):
-        if np.isnan(results).all(axis=0)[0]:
+        if np.isnan(results[:, 0]).all():
             height, slack = params[0, fiber.HEIGHT], params[0, fiber.SLACK]
             along = np.sqrt(states[:, 4] ** 2 - height**2)
             speed = results[:, 3] * states[:, 4] / along

@@ -1,13 +1,14 @@
 """Write what OpenSim says of muscles at random states, for tests/test_osim_muscles.py, to tests/data/osim/muscles.json.
 
 Run it with a Python that has the `opensim` wheel (4.6): python benchmarks/osim/freeze_muscles.py FOLDER, with the
-folder of the models. A set is the muscles of one model, or a muscle with curves of its own; each has 200 states. A muscle
-pulls on a slider, so that its length is any number; its other parameters are those of the file.
+folder of the models. A set is the muscles of one model, or a muscle with curves of its own; each has 200 states. A
+muscle pulls on a slider, so that its length is any number; its other parameters are those of the file.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import math
 import sys
@@ -15,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import opensim as osim
+
+osim: Any = importlib.import_module("opensim")  # not among the packages that mjwrap needs
 
 STATES = 200
 MODELS = (
