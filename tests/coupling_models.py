@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike
 
 import mjwrap as mw
 from mjwrap.mjcf.couplings import CoupledJoints
@@ -41,7 +42,7 @@ class Spline:
         return cls(knots, pieces)
 
     @classmethod
-    def through(cls, x: Array, y: Array) -> Spline:
+    def through(cls, x: ArrayLike, y: ArrayLike) -> Spline:
         """Return the natural cubic spline through points, which goes on linearly outside."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         h, slope = np.diff(x), np.diff(y) / np.diff(x)
@@ -80,7 +81,7 @@ class Spline:
         found = []
         for piece in self.pieces:
             c = np.zeros(5)
-            moved = (piece(shifted) - start).coef * factor
+            moved = np.asarray((piece(shifted) - start).coef, dtype=np.float64) * factor
             c[: len(moved)] = moved
             found.append(c)
         return found
@@ -179,14 +180,16 @@ class Knee:
         """Return a pose with the followers in place, computed from the splines alone."""
         found = qpos.copy()
         for follower, spline in self.splines.items():
-            x = sum(w * found[model.joint(name).qposadr[0]] for name, w in self.leaders[follower].items())
+            x = sum(w * float(found[model.joint(n).qposadr[0]]) for n, w in self.leaders[follower].items())
             found[model.joint(follower).qposadr[0]] = spline(x)
         return found
 
     def set_active(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Set the active piece of every coupling from the present pose, in Python."""
         for follower, spline in self.splines.items():
-            x = sum(w * data.qpos[model.joint(name).qposadr[0]] for name, w in self.leaders[follower].items())
+            x = sum(
+                w * float(data.qpos[model.joint(n).qposadr[0]]) for n, w in self.leaders[follower].items()
+            )
             first = "wheel_only" if follower == "wheel" else follower
             for p in range(len(spline.pieces)):
                 data.eq_active[model.equality(f"{first}_{p}").id] = p == spline.piece(x)
