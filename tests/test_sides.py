@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import mjwrap as mw
+from mjwrap.surfaces import Surface
 
 Vector = np.ndarray[Any, np.dtype[np.float64]]
 OSIM: dict[str, Any] = json.loads(
@@ -24,7 +25,7 @@ ROWS = [
 ]  # fmt: skip
 
 
-def surface(kind: str, rng: np.random.Generator) -> mw.Surface:
+def surface(kind: str, rng: np.random.Generator) -> Surface:
     r = float(rng.uniform(0.015, 0.03))
     made = {
         "cylinder": mw.Cylinder(r),
@@ -263,7 +264,7 @@ def test_a_string_that_no_side_can_hold_says_so() -> None:
             assert path.hints_met == [met]
 
 
-def _surface_of(row: dict[str, Any]) -> mw.Surface:
+def _surface_of(row: dict[str, Any]) -> Surface:
     sizes = row["sizes"]
     made = {"WrapCylinder": lambda: mw.Cylinder(*sizes), "WrapSphere": lambda: mw.Sphere(*sizes)}
     return made.get(row["kind"], lambda: mw.Ellipsoid(tuple(sizes)))()

@@ -48,7 +48,7 @@ def local_to_wrap(wrap: Any, state: Any, point: Any) -> list[float]:
     return [found.get(i) for i in range(3)]
 
 
-def muscle_wraps(model: Any, state: Any, path: Any) -> list[tuple[str, Any, Any, Any, float]]:
+def muscle_wraps(model: Any, state: Any, path: Any) -> list[tuple[Any, str, Any, Any, float]]:
     """Return wrap, point before, point after and OpenSim's length between them, for every wrap that touches now."""
     points = path.getCurrentPath(state)
     found = []

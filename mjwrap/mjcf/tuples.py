@@ -104,7 +104,9 @@ def read_tuple(
 
 def _check_sides(model: mujoco.MjModel, rest: mujoco.MjData, muscle: str, routes: tuple[Route, ...]) -> None:
     """Raise a `ModelError` for a side that says no half: a site on the axis of its geom, or in its middle."""
-    for node in (node for route in routes for node in route.nodes if node.side and node.surface is not None):
+    for node in (node for route in routes for node in route.nodes):
+        if not node.side or node.surface is None:
+            continue
         turned = rest.geom_xmat[node.geom].reshape(3, 3)
         fault = side_fault(
             node.surface, turned.T @ (rest.site_xpos[node.hint_site] - rest.geom_xpos[node.geom])
