@@ -2,12 +2,15 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 from osim_frozen import frozen, model_path
 
 from mjwrap.osim.description.forces import Bushing, HuntCrossley, LimitForce, Muscle, OtherForce
+from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading import read_osim
 
@@ -22,16 +25,16 @@ OLD_SOCKET = "connector_parent_frame_connectee_name"
 END = "</Model></OpenSimDocument>"
 
 
-def named(model, name):
+def named(model: OsimModel, name: str) -> Any:
     return next(force for force in model.forces if force.name == name)
 
 
-def read_text(tmp_path, text: str):
+def read_text(tmp_path, text: str) -> OsimModel:
     (tmp_path / "model.osim").write_text(text, encoding="utf-8")
     return read_osim(tmp_path / "model.osim")
 
 
-def differences(first, second, place=""):
+def differences(first: Any, second: Any, place: str = "") -> Iterator[str]:
     """Yield the places at which two descriptions differ by more than the six digits of OpenSim's converter."""
     if dataclasses.is_dataclass(first) and type(first) is type(second):
         for field in dataclasses.fields(first):
@@ -49,6 +52,7 @@ def differences(first, second, place=""):
         for key in first:
             yield from differences(first[key], second[key], f"{place}[{key}]")
     elif isinstance(first, float):
+        assert isinstance(second, float)
         if not math.isclose(first, second, rel_tol=1e-6, abs_tol=1e-6):
             yield place
     elif first != second:
@@ -85,8 +89,6 @@ def test_muscle_parameters_and_curves_are_those_of_opensim(name):
         assert muscle.active == wanted.pop("appliesForce")
         assert muscle.control_range == (wanted.pop("min_control"), wanted.pop("max_control"))
         assert muscle.rigid_tendon == wanted["ignore_tendon_compliance"]
-        if "Deprecated" in muscle.kind:
-            wanted = {tag: value for tag, value in wanted.items() if tag in muscle.parameters}
         assert muscle.parameters == wanted
         assert muscle.curves.keys() == record["curves"].keys()
         for kind, values in record["curves"].items():
@@ -127,6 +129,28 @@ def test_limit_forces_of_angles_are_in_radians():
     assert told == pytest.approx(
         (90 * degree, -45 * degree, 2 / degree, 3 / degree, 0.1 / degree, 10 * degree)
     )
+
+
+def test_a_ligament_without_a_curve_has_opensims(tmp_path):
+    path = "".join(
+        f'<PathPoint name="{body}"><socket_parent_frame>/{body}</socket_parent_frame></PathPoint>'
+        for body in ("ground", "bodyset/b")
+    )
+    force = (
+        f'<ForceSet><objects><Ligament name="l"><GeometryPath><PathPointSet><objects>{path}</objects></PathPointSet>'
+        "</GeometryPath><resting_length>0.1</resting_length></Ligament></objects></ForceSet>"
+    )
+    ligament = named(read_text(tmp_path, HEAD + BODY + PIN + force + END), "l")
+    wanted = [-3.2306612054232605e-05, 0.009490495275649737, 0.12, 1.7075513639847175, 2.0043435968913625]
+    assert ligament.curve([0.9, 1.05, 1.2, 1.55, 2.0]) == pytest.approx(wanted, abs=1e-14)  # of OpenSim 4.6
+
+
+def test_a_schutte_muscle_has_opensims_curves_where_it_lists_none():
+    muscle = named(read_osim(model_path("own_version_3.osim")), "m2")
+    assert muscle.splines["tendon_force_length_curve"](2.0) == 4.0  # of the file
+    assert muscle.splines["active_force_length_curve"](1.045) == 0.993333
+    assert muscle.splines["passive_force_length_curve"](1.55) == pytest.approx(1.7075513639847175, abs=1e-14)
+    assert (muscle.parameters["activation1"], muscle.parameters["time_scale"]) == (7.0, 0.05)
 
 
 def test_nested_frames_lead_to_their_body():
@@ -195,7 +219,7 @@ def test_coordinates_with_one_name_get_names_of_their_own_and_paths_tell_them_ap
     )
     model = read_text(tmp_path, HEAD + bodies + joints + force + "</objects></ForceSet>" + END)
     assert [c.name for c in model.coordinates] == ["q", "k_q"]
-    assert [f.coordinate for f in model.forces] == ["q", "q", "k_q"]
+    assert [named(model, name).coordinate for name in ("f0", "f1", "f2")] == ["q", "q", "k_q"]
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,10 @@ def main() -> None:
         compare(paths)
         return
     write(output / "poses.json", {path.name: alone(poses_of, path, POSES) for path in paths})
-    write(output / "muscle_parameters.json", {path.name: found for path in paths if (found := alone(muscles_of, path))})
+    write(
+        output / "muscle_parameters.json",
+        {path.name: found for path in paths if (found := alone(muscles_of, path))},
+    )
     write(output / "splines.json", splines())
     alone(write_again, own / "own_version_3.osim", output / "upgraded_version_3.osim")
 

@@ -21,8 +21,9 @@ from mjwrap.osim.description.forces import (
 )
 from mjwrap.osim.description.paths import Path
 from mjwrap.osim.description.rotations import body_fixed_xyz
+from mjwrap.osim.reading.default_curves import PASSIVE_FORCE_LENGTH, spline_through
 from mjwrap.osim.reading.frames import Places, offset, socket, unnamed
-from mjwrap.osim.reading.functions import read_property
+from mjwrap.osim.reading.functions import read_function
 from mjwrap.osim.reading.joints import ROTATIONAL
 from mjwrap.osim.reading.muscles import is_muscle, read_muscle
 from mjwrap.osim.reading.nodes import Node
@@ -64,7 +65,8 @@ def _ligament(node: Node, name: str, path: Path, active: bool) -> Force:
     length = node.number("resting_length", default=0.0)
     if not length > 0.0:
         raise node.error(f"resting_length must be positive, not {length:g}")
-    curve = read_property(node, "force_length_curve")
+    given = node.object("force_length_curve")
+    curve = spline_through(PASSIVE_FORCE_LENGTH) if given is None else read_function(given)
     return Ligament(name, path, length, node.number("pcsa_force", default=0.0), curve, active)
 
 
@@ -135,12 +137,12 @@ def two_frames(node: Node, places: Places) -> tuple[Frame, Frame]:
 
 def _bushing(node: Node, name: str, known: Known, active: bool) -> Force:
     first, second = two_frames(node, known.places)
-    values = [
+    turning, moving, turning_damping, moving_damping = (
         node.vector(f"{motion}_{what}", size=3, default=(0.0, 0.0, 0.0))
         for what in ("stiffness", "damping")
         for motion in ("rotational", "translational")
-    ]
-    return Bushing(name, first, second, *values, active)
+    )
+    return Bushing(name, first, second, turning, moving, turning_damping, moving_damping, active)
 
 
 def _contact(node: Node, name: str, known: Known, active: bool) -> Force:

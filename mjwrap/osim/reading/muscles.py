@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from mjwrap.osim.description.forces import Muscle
 from mjwrap.osim.description.functions import Piecewise
 from mjwrap.osim.description.paths import Path
+from mjwrap.osim.reading.default_curves import OF_MUSCLES, spline_through
 from mjwrap.osim.reading.functions import read_property
 from mjwrap.osim.reading.millard_curves import read_curves
 from mjwrap.osim.reading.nodes import Node
@@ -32,6 +33,7 @@ MILLARD: dict[str, float] = {
     "minimum_activation": 0.01,
     "maximum_pennation_angle": _NEARLY_RIGHT,
 }
+SIMM: dict[str, float] = {"time_scale": 0.1, "activation1": 7.667, "activation2": 1.45985}
 OWN: dict[str, dict[str, float]] = {
     "Thelen2003Muscle": {
         "default_activation": 0.05,
@@ -68,6 +70,21 @@ OWN: dict[str, dict[str, float]] = {
         "activation_dynamics_smoothing": 0.1,
     },
     "RigidTendonMuscle": {},
+    "Schutte1993Muscle_Deprecated": {**SIMM, "damping": 0.1},
+    "Delp1990Muscle_Deprecated": {**SIMM, "mass": 0.00287},
+    "Thelen2003Muscle_Deprecated": {
+        "activation_time_constant": 0.01,
+        "deactivation_time_constant": 0.04,
+        "Vmax": 10.0,
+        "Vmax0": 5.0,
+        "FmaxTendonStrain": 0.033,
+        "FmaxMuscleStrain": 0.6,
+        "KshapeActive": 0.5,
+        "KshapePassive": 4.0,
+        "damping": 0.05,
+        "Af": 0.3,
+        "Flen": 1.8,
+    },
 }
 LEAST_CONTROL = {"Thelen2003Muscle": 0.01, "Millard2012EquilibriumMuscle": 0.01}
 NEW_PENNATION = 20302  # the document version that first had pennation_angle_at_optimal
@@ -82,13 +99,17 @@ MILLARD_CLASSES = ("Millard2012EquilibriumMuscle", "Millard2012AccelerationMuscl
 
 def is_muscle(node: Node) -> bool:
     """Return whether a force is a muscle of a class that is known, or of one with a muscle's parameters."""
-    return node.tag in OWN or (node.tag.find("Muscle") >= 0 and node.find("max_isometric_force") is not None)
+    return (
+        bool(_own(node))
+        or node.tag in OWN
+        or (node.tag.find("Muscle") >= 0 and node.find("max_isometric_force") is not None)
+    )
 
 
 def read_muscle(node: Node, name: str, path: Path, active: bool) -> Muscle:
     """Return a muscle along a path."""
     parameters: dict[str, float] = {}
-    for tag, default in {**COMMON, **OWN.get(node.tag, {})}.items():
+    for tag, default in {**COMMON, **_own(node)}.items():
         parameters[tag] = _value(node, tag, default)
     if node.tag not in OWN:
         parameters.update(_all_numbers(node, parameters))
@@ -100,12 +121,13 @@ def read_muscle(node: Node, name: str, path: Path, active: bool) -> Muscle:
             f"tendon_slack_length must not be negative, not {parameters['tendon_slack_length']:g}"
         )
     fastest, older = parameters["max_contraction_velocity"], node.find("Vmax")
-    if node.tag in OWN and older is not None and older.values() != [fastest]:
+    if "Vmax" not in parameters and node.tag in OWN and older is not None and older.values() != [fastest]:
         node.note(f"its Vmax is not used; as in OpenSim 4 max_contraction_velocity is {fastest:g}")
     curves: Mapping[str, Mapping[str, float]] = {}
     if node.tag in MILLARD_CLASSES:
         curves = read_curves(node)
-    splines: dict[str, Piecewise] = {}
+    known = OF_MUSCLES.get(node.tag) or OF_MUSCLES.get(f"{node.tag}_Deprecated") or {}
+    splines: dict[str, Piecewise] = {tag: spline_through(knots) for tag, knots in known.items()}
     for tag in SPLINES:
         if node.object(tag) is not None:
             splines[tag] = read_property(node, tag)
@@ -113,6 +135,11 @@ def read_muscle(node: Node, name: str, path: Path, active: bool) -> Muscle:
     high = node.number("max_control", default=1.0, finite=False)
     rigid = bool(parameters["ignore_tendon_compliance"]) or node.tag == "RigidTendonMuscle"
     return Muscle(name, node.tag, path, parameters, curves, splines, rigid, active, (low, high))
+
+
+def _own(node: Node) -> dict[str, float]:
+    """Return the parameters that only this class has, with their defaults; older files lack "_Deprecated" in names."""
+    return OWN.get(node.tag) or OWN.get(f"{node.tag}_Deprecated") or {}
 
 
 def _value(node: Node, tag: str, default: float) -> float:
