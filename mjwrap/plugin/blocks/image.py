@@ -18,8 +18,8 @@ from mjwrap.mjcf import MuscleDeclaration
 from mjwrap.mjcf.marks import limit_marks
 from mjwrap.model.arrays import Plan
 from mjwrap.plugin.blocks.model_changes import Watch, watch
-from mjwrap.plugin.blocks.points_part import points_part
 from mjwrap.plugin.blocks.pieces_part import pieces_part
+from mjwrap.plugin.blocks.points_part import points_part
 from mjwrap.plugin.blocks.published_part import published_part
 from mjwrap.plugin.blocks.transmission_part import transmission_part
 from mjwrap.plugin.callbacks import block as bk
