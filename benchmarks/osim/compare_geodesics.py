@@ -4,7 +4,8 @@
 
 For every path and random pose: mjwrap's length over the surfaces in the order in which the import wrote them, that of
 a `Scholz2015GeometryPath` over the surfaces that mjwrap touches (hint: middle of mjwrap's contact chord; over one
-sphere the closed form), and that of the file's own path. Coordinates are drawn as the import draws them; constraints are met.
+sphere the closed form), and that of the file's own path. Coordinates are drawn as the import draws them; constraints
+are met.
 """
 
 import argparse
