@@ -18,9 +18,9 @@ OSIM = '<?xml version="1.0"?>\n<!-- <mujoco> -->\n<OpenSimDocument Version="4000
 @pytest.mark.parametrize(
     ("name", "contents", "told"),
     [
-        ("arm.osim", OSIM, "OpenSim's model files yet; convert it to MJCF"),
-        ("arm.osim", None, "OpenSim's model files yet"),
-        ("arm.xml", OSIM, "OpenSim's model files yet"),
+        ("arm.osim", OSIM, "an OpenSim model; import it first: mjwrap import "),
+        ("arm.osim", None, "an OpenSim model; import it first: mjwrap import "),
+        ("arm.xml", OSIM, "an OpenSim model; import it first: mjwrap import "),
         ("r.urdf", '<!-- a --><robot name="r"><link name="a"/></robot>', "a URDF file, which cannot contain"),
         ("r.xml", '<robot name="r"><link name="a"/></robot>', "a URDF file"),
         ("s.xml", '<!DOCTYPE sdf><sdf version="1.9"/>', "begins with <sdf>, an MJCF file with <mujoco>"),
@@ -73,14 +73,16 @@ def test_a_model_of_opensim_is_not_a_table(
     ran = run_here("run", capsys, ELBOW, option, file)
     assert ran.code == 2
     assert "arm.osim" in said(ran)[-1]
-    with pytest.raises(mw.TableError, match=r"a model of OpenSim, not a table; tables end in \.sto"):
+    with pytest.raises(
+        mw.TableError, match=r"a model of OpenSim, not a table: mjwrap import reads it; tables end in \.sto"
+    ):
         mw.read_table(file)
 
 
 @pytest.mark.parametrize(
     ("file", "told"),
     [
-        ("arm.osim", "a model of OpenSim, which mjwrap does not read yet"),
+        ("arm.osim", "a model of OpenSim: mjwrap import arm.osim makes a MuJoCo model of it"),
         ("arm.xml", "is a model, not a recording .* mjwrap run arm.xml --excitation pulses --record"),
         ("mjwrap:elbow", "mjwrap run mjwrap:elbow"),
     ],
@@ -130,3 +132,20 @@ def test_a_misspelt_name_lists_those_that_resemble_it(
         read_model(file)
     with pytest.raises(mw.ModelError, match=told):
         mw.install(mujoco.MjSpec.from_file(str(file)))
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("mjwrap:leg", "import it first: mjwrap import mjwrap:leg -o leg.xml"),
+        ("mjwrap:lge", "no model 'lge'"),
+    ],
+)
+def test_a_model_of_opensim_that_comes_with_mjwrap_is_imported(name: str, told: str) -> None:
+    with pytest.raises(mw.ModelError, match=told):
+        mw.load(name)
+    if name.endswith("leg"):
+        assert mw.import_osim(name).report.model == "leg"
+    else:
+        with pytest.raises(mw.OsimError, match="did you mean 'leg'"):
+            mw.import_osim(name)

@@ -32,7 +32,9 @@ def read_table(path: str | os.PathLike[str], *, finite: bool = True) -> Table:
     name = as_path(path, TableError)
     validation.flag(finite, "finite", TableError)
     if name.lower().endswith(".osim"):
-        raise TableError(f"'{name}' is a model of OpenSim, not a table; tables end in {', '.join(SUFFIXES)}")
+        raise TableError(
+            f"'{name}' is a model of OpenSim, not a table: mjwrap import reads it; tables end in {', '.join(SUFFIXES)}"
+        )
     suffix = Path(name).suffix.lower()
     if suffix == ".npz":
         table = _read_npz(name)

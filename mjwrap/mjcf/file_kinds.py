@@ -8,15 +8,19 @@ from pathlib import Path
 _ROOT = re.compile(rb"<\s*([A-Za-z_][\w.:-]*)")
 _NOT_TAGS = re.compile(rb"<!--.*?(-->|\Z)|<\?.*?(\?>|\Z)|<!.*?(>|\Z)", re.DOTALL)
 _PICTURES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"%PDF")
-OPENSIM = (
-    "is an OpenSim model, and mjwrap does not read OpenSim's model files yet; convert it to MJCF first, for example "
-    "with MyoConverter (https://github.com/MyoHub/myoconverter), and give the .xml. Tables of OpenSim (.sto, .mot) are "
-    "read as they are"
-)
 _URDF = (
     "is a URDF file, which cannot contain tendons or muscles; save it as MJCF "
     "(mujoco.MjSpec.from_file('robot.urdf').to_file('robot.xml')), add muscles, and give the .xml"
 )
+
+
+def opensim(file: Path) -> str:
+    """Return what an OpenSim model is and what to do with it, as the rest of a sentence."""
+    out = f"{file.stem}.xml"
+    return (
+        f"is an OpenSim model; import it first: mjwrap import {file} -o {out} (in Python: "
+        f"mw.import_osim('{file}').save('{out}')), and give {out}"
+    )
 
 
 def foreign(file: Path) -> str:
@@ -32,7 +36,7 @@ def foreign(file: Path) -> str:
     root = _ROOT.search(_NOT_TAGS.sub(b"", start))
     tag = root.group(1).decode() if root else ""
     if suffix == ".osim" or tag == "OpenSimDocument":
-        return OPENSIM
+        return opensim(file)
     if tag == "robot":
         return _URDF
     if start.startswith(_PICTURES):

@@ -11,7 +11,7 @@ from pathlib import Path
 import mujoco
 
 from mjwrap.errors import ModelError
-from mjwrap.mjcf.file_kinds import OPENSIM, foreign
+from mjwrap.mjcf.file_kinds import foreign, opensim
 from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, own_file, own_models
 from mjwrap.mjcf.names import listed
@@ -45,7 +45,7 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
     file = own_file(text) if text.startswith(OWN) else Path(text)
     if not file.is_file():
         if file.suffix.lower() == ".osim":
-            raise ModelError(f"{file} does not exist; by its name it {OPENSIM}")
+            raise ModelError(f"{file} does not exist; by its name it {opensim(file)}")
         folder, what = (file, "is a folder") if file.is_dir() else (file.parent, "does not exist")
         if not folder.is_dir():
             raise ModelError(f"model file {file} does not exist, nor does the folder {folder}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from typing import Any
 
 import mujoco
 
-from mjwrap.errors import ModelError
+from mjwrap.errors import ModelError, OsimError
 from mjwrap.mjcf.names import listed
 from mjwrap.text import nearest
 
@@ -32,9 +33,34 @@ def own_models() -> dict[str, Path]:
     return {}
 
 
+def own_osim_models() -> dict[str, Path]:
+    """Return the OpenSim models that come with mjwrap, by name."""
+    return {file.stem: file for folder in _FOLDERS for file in sorted(folder.glob("*/*.osim"))}
+
+
+def osim_file(source: str | os.PathLike[str]) -> Path:
+    """Return the file of an OpenSim model that is named by its path or as "mjwrap:NAME".
+
+    Raises `OsimError`, which lists the models, if mjwrap has none of that name.
+    """
+    text, known = os.fspath(source), own_osim_models()
+    if not text.startswith(OWN):
+        return Path(text)
+    name = text.removeprefix(OWN)
+    if name not in known:
+        raise OsimError(
+            f"mjwrap has no OpenSim model '{name}'{nearest(name, known)}; it has: {listed(known)}"
+        )
+    return known[name]
+
+
 def own_file(source: str) -> Path:
     """Return the file of "mjwrap:NAME"; `ModelError`, which lists the models, if there is no such one."""
     name, known = source.removeprefix(OWN), own_models()
+    if name in own_osim_models() and name not in known:
+        raise ModelError(
+            f"'{source}' is an OpenSim model; import it first: mjwrap import {source} -o {name}.xml"
+        )
     if name not in known:
         raise ModelError(f"mjwrap has no model '{name}'{nearest(name, known)}; it has: {listed(known)}")
     return known[name]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import mujoco
 
 from mjwrap.files.atomic import PartFile
+from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathSpring
 from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.reading.model import read_osim
@@ -72,7 +73,7 @@ def import_osim(
     """Import an OpenSim model (.osim) as a MuJoCo model with geodesic muscles.
 
     Args:
-        path: the file.
+        path: the file, or "mjwrap:NAME" for a model that comes with mjwrap.
         meshes: folders in which its mesh files are searched first; then the file's own folder and its Geometry are.
         poses: number of poses within the coordinates' ranges at which the places of wrap objects on their paths are
             chosen.
@@ -83,6 +84,7 @@ def import_osim(
     Raises:
         OsimError: the file is not an OpenSim model, or has an element that cannot be represented; the message names it.
     """
+    path = osim_file(path)
     model = read_osim(path)
     document, report = Document(model.name), Report(model.name, model.version)
     folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]

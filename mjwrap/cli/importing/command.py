@@ -8,6 +8,7 @@ and two motions. It needs the opensim package (pip install opensim), or its numb
 it: --numbers FILE.json keeps them there, and reads them where the file exists.
 
 Examples:
+  mjwrap import mjwrap:leg -o leg.xml
   mjwrap import arm26.osim -o arm26.xml
   mjwrap import gait10dof18musc.osim --geometry Geometry --report gait.html
   mjwrap import arm26.osim -o arm26.xml --verify --numbers arm26_opensim.json --json arm26.json
@@ -27,7 +28,7 @@ from mjwrap.cli.importing.importing import ImportSettings, import_model
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     add = parser.add_argument
-    add("model", metavar="MODEL.osim", help="OpenSim model")
+    add("model", metavar="MODEL.osim", help="OpenSim model, or mjwrap:NAME")
     add(
         "-o",
         "--out",

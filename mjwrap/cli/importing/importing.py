@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.importing.page import write_page
 from mjwrap.cli.importing.text import tell_entries, tell_verification
 from mjwrap.errors import OsimError
+from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.importing import Imported
 from mjwrap.osim.verifying.differences import Verification, verify
 from mjwrap.osim.verifying.opensim_numbers import compute_reference, has_opensim
@@ -47,6 +48,7 @@ class ImportSettings:
 
 def import_model(settings: ImportSettings) -> int:
     """Import, report, write the files, and return the exit code."""
+    settings = replace(settings, model=str(osim_file(settings.model)))
     if not os.path.isfile(settings.model):
         raise UserError(f"'{settings.model}' is not a file")
     out = settings.out or f"{Path(settings.model).stem}.xml"
