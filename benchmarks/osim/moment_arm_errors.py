@@ -4,7 +4,7 @@
 
 The measure of converters' reports: the mean of |r - r_OpenSim| over sweeps of one coordinate at a time through its
 range, the others at their default values and at random ones; over all pairs of a muscle and a coordinate for which
-OpenSim has a moment arm above 0.1 mm at one sample at least. Signs are OpenSim's. Printed too: the mean over pairs without wraps, the
+OpenSim has a moment arm above 0.1 mm at one sample at least. Printed too: the mean over pairs without wraps, the
 largest mean of a pair, and how many mean errors are up to 1 micrometre.
 """
 
@@ -99,7 +99,7 @@ def main() -> None:
         worst = max(pairs, key=lambda pair: pairs[pair])
         small = sum(e <= 1e-6 for e in pairs.values())
         print(
-            f"{file.stem:30} {seconds:10.2f}  {len(pairs):5}  {1e3 * np.mean(list(pairs.values())):9.4f}  "
+            f"{file.stem:30} {seconds:10.2f}  {len(pairs):5}  {1e3 * np.mean(list(pairs.values())):9.1e}  "
             f"{1e3 * np.mean(straight) if straight else float('nan'):18.1e}  {small:10}  "
             f"{1e3 * pairs[worst]:.3f} ({worst[0]} about {worst[1]})",
             flush=True,
