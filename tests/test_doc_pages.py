@@ -20,7 +20,7 @@ from doc_commands import FENCE, ROOT, of_page
 import mjwrap as mw
 from mjwrap.video import offscreen
 
-PAGES = ["from_opensim.md", "from_myosuite.md", "cables.md"]
+PAGES = ["from_opensim.md", "opensim.md", "from_myosuite.md", "cables.md"]
 LESS = {"compare": ["--samples", "5", "--bases", "0", "--duration", "0"], "check": ["--poses", "2"]}
 
 

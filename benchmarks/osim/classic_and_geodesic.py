@@ -185,14 +185,16 @@ def main() -> None:
     for i, name in enumerate(theirs["muscles"]):
         sizes = [float(np.abs(ours[k][:, i] - theirs[k][:, i]).max()) for k in ("length", "speed", "tension")]
         print(
-            f"{name:12} {1e3 * sizes[0]:12.4f} {1e3 * sizes[1]:13.3f} {sizes[2]:12.3f} {theirs['tension'][:, i].max():15.1f}"
+            f"{name:12} {1e3 * sizes[0]:12.4f} {1e3 * sizes[1]:13.3f} {sizes[2]:12.3f} "
+            f"{theirs['tension'][:, i].max():15.1f}"
         )
     for i, name in enumerate(theirs["joints"]):
         torque = float(np.abs(ours["torque"][:, i] - theirs["torque"][:, i]).max())
         gap = np.abs(motion[:, i] - theirs["q"][:, i])
         most = float(np.abs(theirs["torque"][:, i]).max())
         print(
-            f"{name}: torque {torque:.4f} N m of at most {most:.2f} N m; motion {gap.max():.5f} rad, at 0.3 s {gap[30]:.6f} rad"
+            f"{name}: torque {torque:.4f} N m of at most {most:.2f} N m; motion {gap.max():.5f} rad, "
+            f"at 0.3 s {gap[30]:.6f} rad"
         )
     if options.plot:
         plot(options.plot, theirs, ours, motion)

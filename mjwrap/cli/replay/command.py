@@ -101,7 +101,8 @@ def _refuse_models(file: str) -> None:
     if name.endswith(".osim"):
         raise UserError(
             f"'{file}' is a model of OpenSim: mjwrap import {file} makes a MuJoCo model of it; replay "
-            f"shows recordings (.rrd), and tables of states ({', '.join(SUFFIXES)}) of the MuJoCo model that --model names"
+            f"shows recordings (.rrd), and tables of states ({', '.join(SUFFIXES)}) of the MuJoCo model that --model "
+            "names"
         )
     if name.endswith((".xml", ".mjb", ".urdf")) or name.startswith(("mjwrap:", "myo_sim:")):
         raise UserError(
