@@ -27,7 +27,7 @@ import bootstrap
 import mjwrap as mw
 from mjwrap.cli.common import console
 from mjwrap.cli.main import COMMANDS, module_of
-from mjwrap.mjcf.named_models import own_models
+from mjwrap.mjcf.named_models import own_models, own_osim_models
 from mjwrap.video import offscreen
 
 LINES = [
@@ -37,6 +37,10 @@ LINES = [
 # What a reader brings, in examples about files of another program or of an earlier run.
 BROUGHT = {
     "arm.xml",
+    "arm.osim",
+    "arm26.osim",
+    "gait10dof18musc.osim",
+    "arm26_opensim.json",
     "motion.mot",
     "ik.mot",
     "states.npz",
@@ -127,8 +131,9 @@ def _exists(name: str, line: Line, made: set[str]) -> bool:
 
         return name.removeprefix("myo_sim:") in {*myo_sim.REGISTRY, *myo_sim._composed_models()}
     if name.startswith("mjwrap:"):
-        return name.removeprefix("mjwrap:") in own_models() or (not line.typed and name == "mjwrap:NAME")
-    if not line.typed and name in ("MODEL", "FILE"):
+        known = {*own_models(), *own_osim_models()}
+        return name.removeprefix("mjwrap:") in known or (not line.typed and name == "mjwrap:NAME")
+    if not line.typed and name in ("MODEL", "MODEL.osim", "FILE"):
         return True
     brought = name in BROUGHT or bool(OPENSIM.fullmatch(name))
     # a recording may be made by the page's Python, and in a help text by another command
@@ -177,6 +182,10 @@ def _script(script: Path, words: list[str]) -> str | None:
         runpy.run_path(str(script), run_name="__main__")
     except Read:
         return None
+    except ModuleNotFoundError as error:
+        if error.name != "opensim":
+            raise
+        return None  # a script beside OpenSim, which is optional: not to be known here
     except SystemExit as code:
         return f"it ends with {code.code} on its arguments"
     finally:

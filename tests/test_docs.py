@@ -139,14 +139,21 @@ _ANKLE = """<mujoco><worldbody><site name="origin"/><body><joint/><geom size=".1
 <tendon><spatial name="soleus"><site site="origin"/><site site="insertion"/></spatial></tendon>
 <actuator>{}</actuator></mujoco>"""
 
+_COUPLED = """<mujoco><worldbody><body><joint name="knee"/><joint name="slide" type="slide"/><geom size=".1"/></body>
+</worldbody>{}</mujoco>"""
+
 
 def test_xml_fences_compile_in_their_models() -> None:
-    found = {
-        page.name: fence["body"]
+    fences = [
+        (page.name, fence["body"])
         for page in PAGES
         for fence in FENCE.finditer(page.read_text())
         if fence["language"] == "xml"
-    }
+    ]
+    found = dict(reversed(fences))  # the first one of each page
+    assert [name for name, _ in fences] == ["cables.md", "declaring.md", "declaring.md", "muscles.md"]
+    coupling = mujoco.MjModel.from_xml_string(_COUPLED.format(fences[2][1]))
+    assert (coupling.neq, coupling.ntuple) == (2, 1)
     assert set(found) == {"cables.md", "declaring.md", "muscles.md"}, (
         "say here what another page's XML is a part of"
     )

@@ -151,7 +151,7 @@ def plot(file: str, theirs: dict[str, np.ndarray], ours: dict[str, np.ndarray], 
             axis.plot(time, scale * (ours[key][:, i] - theirs[key][:, i]), label=name)
         axis.set_title(f"geodesic − classic: {label}", fontsize=10)
     axes[0, 0].legend(fontsize=8)
-    for i, name in enumerate(theirs["muscles"]):
+    for i in range(len(theirs["muscles"])):
         axes[1, 0].plot(time, theirs["tension"][:, i], "--", color=f"C{i}")
         axes[1, 0].plot(time, ours["tension"][:, i], color=f"C{i}")
     axes[1, 0].set_title("tension [N]: geodesic —, classic - -", fontsize=10)
