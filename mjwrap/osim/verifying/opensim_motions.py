@@ -11,7 +11,10 @@ from mjwrap.osim.verifying.reference import MotionNumbers
 
 ACCURACY = 1e-9  # of OpenSim's integrator
 INTERVAL = 0.01  # between frames [s]
-SPREAD, SPEED = 0.2, 1.0  # of the start of a passive motion: distance from the default pose and speed [rad, m, rad/s, m/s]
+SPREAD, SPEED = (
+    0.2,
+    1.0,
+)  # of the start of a passive motion: distance from the default pose and speed [rad, m, rad/s, m/s]
 
 
 def opensim_motion(
@@ -45,7 +48,7 @@ def opensim_motion(
     coordinates = {found.get(i).getName(): found.get(i) for i in range(found.getSize())}
     if excitation is not None:
         model.equilibrateMuscles(state)
-    elif model.getConstraintSet().getSize() == 0:
+    elif not _bound(opensim, model):
         _start(state, coordinates, np.random.default_rng(seed))
     muscles = {} if excitation is None else {name: model.getMuscles().get(name) for name in names}
     activation = {name: float(m.getActivation(state)) for name, m in muscles.items()}
@@ -68,6 +71,13 @@ def opensim_motion(
                 speeds[name] = float(coordinate.getSpeedValue(state))
     passive = energy if excitation is None else []
     return MotionNumbers(times.tolist(), rows, excitation, activation, fiber, speeds, passive)
+
+
+def _bound(opensim: Any, model: Any) -> bool:
+    """Return whether a model has constraints other than couplers."""
+    every = model.getConstraintSet()
+    kind = opensim.CoordinateCouplerConstraint
+    return any(kind.safeDownCast(every.get(i)) is None for i in range(every.getSize()))
 
 
 def _start(state: Any, coordinates: dict[str, Any], rng: np.random.Generator) -> None:

@@ -22,6 +22,7 @@ WIDEST = {
     1: math.pi,
     2: 1.0,
 }  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
+CLOSED = 1e-6  # largest rate of a constraint's error in a motion that satisfies it
 PASSIVE, DRIVEN = 0.3, 0.5  # durations of motions [s]
 EXCITATION = 0.2
 
@@ -88,7 +89,9 @@ class _Computer:
         self._movable = {name: self.coordinates[name] for name in self.independent}
         every_path = {name: path_of(force) for name, force in self.paths.items()}
         self._curved = {  # whose lengths may jump
-            name: path for name, path in every_path.items() if hasattr(path, "getWrapSet") and path.getWrapSet().getSize()
+            name: path
+            for name, path in every_path.items()
+            if hasattr(path, "getWrapSet") and path.getWrapSet().getSize()
         }
 
     def compute(
@@ -152,7 +155,11 @@ class _Computer:
                     c: float(path.computeMomentArm(state, self.coordinates[c])) for c in self.independent
                 }
         tensions = {name: self._tensions(muscle) for name, muscle in self.muscles.items()}
-        wraps = {name: found for name, force in self.paths.items() if (found := contacts(self.opensim, path_of(force), state))}
+        wraps = {
+            name: found
+            for name, force in self.paths.items()
+            if (found := contacts(self.opensim, path_of(force), state))
+        }
         slopes = length_slopes(model, state, self._curved, self._movable) if with_arms else {}
         return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes)
 
@@ -193,9 +200,11 @@ class _Computer:
         if follow:
             of_rates = g @ inverse
             solved, _, rank, _ = np.linalg.lstsq(of_rates[:, follow], -of_rates[:, chosen], rcond=None)
-            if rank < len(follow):
-                return None
             n[follow] = solved
+            if rank < len(follow) or np.abs(of_rates @ n).max(initial=0.0) > CLOSED:
+                return None
+        elif rows and np.abs(g @ inverse @ n).max(initial=0.0) > CLOSED:
+            return None
         reduced = (inverse @ n).T @ m @ (inverse @ n)
         return reduced.tolist()
 

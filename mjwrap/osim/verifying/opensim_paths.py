@@ -1,4 +1,4 @@
-"""What OpenSim's own paths are like at a pose: where they wrap, how they leave surfaces, and how their lengths change."""
+"""OpenSim's own paths at a pose: where they wrap, how they leave surfaces, and how their lengths change."""
 
 from __future__ import annotations
 
@@ -96,10 +96,11 @@ def length_slopes(
         return all(abs(float(coordinates[n].getValue(state)) - v) < 1e-9 for n, v in values.items())
 
     for moved in coordinates if paths else ():
-        sides = []
-        for change in (-STEP, STEP):
-            if put(start | {moved: start[moved] + change}):
-                sides.append({n: (float(p.getLength(state)) - here[n]) / change for n, p in paths.items()})
+        sides = [
+            {n: (float(p.getLength(state)) - here[n]) / change for n, p in paths.items()}
+            for change in (-STEP, STEP)
+            if put(start | {moved: start[moved] + change})
+        ]
         if len(sides) == 2:
             for name in paths:
                 found[name][moved] = [side[name] for side in sides]

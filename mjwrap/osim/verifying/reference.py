@@ -29,8 +29,12 @@ class PoseNumbers:
     lengths: dict[str, float]  # of all paths [m]
     moment_arms: dict[str, dict[str, float]]  # by path and independent coordinate [m]
     tensions: dict[str, list[float | None]]  # by muscle, at rest and the activations of `Reference` [N]
-    wraps: dict[str, dict[str, list[float]]]  # by path and wrap object: arc and chord of its contact [m], and its kink
-    slopes: dict[str, dict[str, list[float]]]  # by path over surfaces and coordinate: slopes of the length on either side
+    wraps: dict[
+        str, dict[str, list[float]]
+    ]  # by path and wrap object: arc and chord of its contact [m], and its kink
+    slopes: dict[
+        str, dict[str, list[float]]
+    ]  # by path over surfaces and coordinate: slopes of the length on either side
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,9 @@ def read_reference(path: str | Path) -> Reference:
         found = Reference(**given)
         fault = _fault(found)
     except (AttributeError, KeyError, TypeError, ValueError):
-        raise OsimError(f"'{path}' is not a file of OpenSim's numbers: entries are missing or damaged") from None
+        raise OsimError(
+            f"'{path}' is not a file of OpenSim's numbers: entries are missing or damaged"
+        ) from None
     if fault:
         raise OsimError(f"'{path}' is not a file of OpenSim's numbers: {fault}")
     return found
@@ -106,7 +112,9 @@ def _fault(found: Reference) -> str:
         ]
         checked += [("wraps", w, (3,)) for wraps in pose.wraps.values() for w in wraps.values()]
         checked += [("slopes", s, (2,)) for slopes in pose.slopes.values() for s in slopes.values()]
-        checked += [("tensions", [0.0 if t is None else t for t in ts], (count,)) for ts in pose.tensions.values()]
+        checked += [
+            ("tensions", [0.0 if t is None else t for t in ts], (count,)) for ts in pose.tensions.values()
+        ]
         if pose.mass is not None:
             checked.append(("mass", pose.mass, (len(found.independent),) * 2))
         for what, values, shape in checked:
