@@ -17,8 +17,8 @@ from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
-# OpenSim's reference motions have gravity and, if driven, muscles. MuJoCo's other forces are switched off by these flags,
-# and springs and dampers by their constants, as couplings in pieces need a passive stage.
+# OpenSim's reference motions have gravity and, if driven, muscles. MuJoCo's other forces are switched off by these
+# flags, and springs and dampers by their constants, as couplings in pieces need a passive stage.
 DRIVEN_OFF = ("LIMIT", "CONTACT")
 CLOSED = 1e-6  # largest rate of a constraint's error in a motion that satisfies it
 PASSIVE_OFF = (*DRIVEN_OFF, "ACTUATION")

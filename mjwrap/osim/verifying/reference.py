@@ -83,9 +83,10 @@ def read_reference(path: str | Path) -> Reference:
         raise OsimError(f"cannot read '{path}': {(error.strerror or str(error)).lower()}") from None
     except ValueError:
         raise OsimError(f"'{path}' is not a file of OpenSim's numbers: it is not JSON") from None
+    if isinstance(given, dict) and given.get("format", FORMAT) != FORMAT:
+        raise OsimError(f"'{path}' was written by another version of mjwrap: compute the numbers anew")
     try:
-        if given.pop("format") != FORMAT:
-            raise OsimError(f"'{path}' was written by another version of mjwrap: compute the numbers anew")
+        del given["format"]
         given["poses"] = [PoseNumbers(**pose) for pose in given["poses"]]
         for motion in ("passive", "driven"):
             given[motion] = None if given[motion] is None else MotionNumbers(**given[motion])
@@ -130,6 +131,9 @@ def _fault(found: Reference) -> str:
 
 
 def _fits(values: object, shape: tuple[int, ...], finite: bool = True) -> bool:
-    array = np.array(values, dtype=np.float64)
+    try:
+        array = np.array(values, dtype=np.float64)
+    except ValueError:  # rows of different lengths
+        return False
     fits = array.ndim == len(shape) and all(w in (-1, n) for w, n in zip(shape, array.shape, strict=True))
     return fits and bool(not finite or np.isfinite(array).all())
