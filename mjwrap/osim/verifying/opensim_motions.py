@@ -49,10 +49,11 @@ def opensim_motion(
     if excitation is not None:
         model.equilibrateMuscles(state)
     elif not _bound(opensim, model):
-        _start(state, coordinates, np.random.default_rng(seed))
+        _start(model, state, coordinates, np.random.default_rng(seed))
     muscles = {} if excitation is None else {name: model.getMuscles().get(name) for name in names}
     activation = {name: float(m.getActivation(state)) for name, m in muscles.items()}
     fiber = {name: float(m.getFiberLength(state)) for name, m in muscles.items()}
+    places = dict(zip(coordinates, coordinate_places(state, coordinates), strict=True))
     manager = opensim.Manager(model)
     manager.setIntegratorAccuracy(ACCURACY)
     manager.initialize(state)
@@ -67,10 +68,30 @@ def opensim_motion(
         energy.append(float(model.calcKineticEnergy(state) + model.calcPotentialEnergy(state)))
         for name, coordinate in coordinates.items():
             rows[name].append(float(coordinate.getValue(state)))
-            if time == 0.0:
-                speeds[name] = float(coordinate.getSpeedValue(state))
+        if time == 0.0:
+            rates = state.getQDot()
+            speeds = {name: float(rates.get(places[name])) for name in coordinates}
     passive = energy if excitation is None else []
     return MotionNumbers(times.tolist(), rows, excitation, activation, fiber, speeds, passive)
+
+
+def coordinate_places(state: Any, coordinates: dict[str, Any]) -> list[int]:
+    """Return the place of each coordinate in OpenSim's vector q, whose rates are not the speeds u of all joints."""
+    found = []
+    for coordinate in coordinates.values():
+        value, before = float(coordinate.getValue(state)), _q(state)
+        locked = coordinate.getLocked(state)
+        coordinate.setLocked(state, False)
+        coordinate.setValue(state, value + 0.125, False)
+        found.append(int(np.argmax(np.abs(_q(state) - before))))
+        coordinate.setValue(state, value, False)
+        coordinate.setLocked(state, locked)
+    return found
+
+
+def _q(state: Any) -> np.ndarray:
+    q = state.getQ()
+    return np.array([q.get(i) for i in range(q.size())])
 
 
 def _bound(opensim: Any, model: Any) -> bool:
@@ -80,11 +101,22 @@ def _bound(opensim: Any, model: Any) -> bool:
     return any(kind.safeDownCast(every.get(i)) is None for i in range(every.getSize()))
 
 
-def _start(state: Any, coordinates: dict[str, Any], rng: np.random.Generator) -> None:
-    for coordinate in coordinates.values():
-        change, speed = rng.uniform(-SPREAD, SPREAD), rng.uniform(-SPEED, SPEED)
-        if coordinate.getLocked(state) or coordinate.isConstrained(state):
-            continue
-        value = coordinate.getValue(state) + change
-        coordinate.setValue(state, float(value), False)
-        coordinate.setSpeedValue(state, float(speed))
+def _start(model: Any, state: Any, coordinates: dict[str, Any], rng: np.random.Generator) -> None:
+    """Move the free coordinates, and give them speeds; the others follow, their speeds by differences."""
+    drawn = {name: (rng.uniform(-SPREAD, SPREAD), rng.uniform(-SPEED, SPEED)) for name in coordinates}
+    free = [name for name, c in coordinates.items() if not c.isConstrained(state)]
+    start = {name: float(coordinates[name].getValue(state)) + drawn[name][0] for name in free}
+
+    def values(time: float) -> dict[str, float]:
+        for name in free:
+            coordinates[name].setValue(state, float(start[name] + time * drawn[name][1]), False)
+        model.assemble(state)
+        return {name: float(c.getValue(state)) for name, c in coordinates.items()}
+
+    before, after = values(-MOMENT), values(MOMENT)
+    values(0.0)
+    for name, coordinate in coordinates.items():
+        if name in free:
+            coordinate.setSpeedValue(state, float(drawn[name][1]))
+        elif not coordinate.getLocked(state):
+            coordinate.setSpeedValue(state, (after[name] - before[name]) / (2.0 * MOMENT))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
-from mjwrap.osim.verifying.opensim_motions import opensim_motion
+from mjwrap.osim.verifying.opensim_motions import coordinate_places, opensim_motion
 from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
 
@@ -85,7 +85,7 @@ class _Computer:
         self.muscles = {muscles.get(i).getName(): muscles.get(i) for i in range(muscles.getSize())}
         bodies = self.model.getBodySet()
         self.bodies = {bodies.get(i).getName(): bodies.get(i) for i in range(bodies.getSize())}
-        self._places = self._find_places()
+        self._places = coordinate_places(self.state, self.coordinates)
         self._movable = {name: self.coordinates[name] for name in self.independent}
         every_path = {name: path_of(force) for name, force in self.paths.items()}
         self._curved = {  # whose lengths may jump
@@ -222,24 +222,6 @@ class _Computer:
         state.setU(self.opensim.Vector(size, 0.0))
         self.model.realizeVelocity(state)
         return found
-
-    def _find_places(self) -> list[int]:
-        """Return the place of each coordinate in OpenSim's vector q."""
-        found = []
-        for coordinate in self.coordinates.values():
-            value = float(coordinate.getValue(self.state))
-            before = self._q()
-            locked = coordinate.getLocked(self.state)
-            coordinate.setLocked(self.state, False)
-            coordinate.setValue(self.state, value + 0.125, False)
-            found.append(int(np.argmax(np.abs(self._q() - before))))
-            coordinate.setValue(self.state, value, False)
-            coordinate.setLocked(self.state, locked)
-        return found
-
-    def _q(self) -> Array:
-        q = self.state.getQ()
-        return np.array([q.get(i) for i in range(q.size())])
 
     def _motion(self, excitation: float | None, duration: float) -> MotionNumbers | None:
         """Return a motion, or None, with a note, where OpenSim fails."""
