@@ -5,7 +5,8 @@
 
 Needs the package opensim. Every model has a process of its own. Each cell is the largest difference, or a share.
 "wrapped" is the share of touching pairs of path and pose within 1e-9 m of OpenSim's own geodesics,
-`Scholz2015GeometryPath`, at `--geodesics` poses; scholz_lengths.py lists the others. "import" is the time of reading and writing [s].
+`Scholz2015GeometryPath`, at `--geodesics` poses; scholz_lengths.py lists the others.
+"import" is the time of reading and writing [s].
 """
 
 from __future__ import annotations

@@ -11,10 +11,9 @@ from mjwrap.osim.verifying.reference import MotionNumbers
 
 ACCURACY = 1e-9  # of OpenSim's integrator
 INTERVAL = 0.01  # between frames [s]
-SPREAD, SPEED = (
-    0.2,
-    1.0,
-)  # of the start of a passive motion: distance from the default pose and speed [rad, m, rad/s, m/s]
+SPREAD = 0.2  # of the start of a passive motion from the default pose [rad, m]
+SPEED = 1.0  # at most, then [rad/s, m/s]
+MOMENT = 1e-4  # of differences [s]
 
 
 def opensim_motion(
