@@ -119,7 +119,7 @@ class Paths:
         return found
 
     def _site(self, poses: mujoco.MjData, site: int) -> Array:
-        return self.muscles.site_positions(poses)[site].copy()
+        return poses.site_xpos[site].copy()
 
 
 def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int, list[str]]:

@@ -9,12 +9,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.errors import StateError
 from mjwrap.osim.verifying.imported import ImportedModel, ImportedNumbers
+from mjwrap.osim.verifying.opensim_paths import STEP
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference
 
 Array = NDArray[np.float64]
 LARGE = 1e-3  # [m] a difference of length or moment arm that needs a reason
 RELATIVE = 1e-2  # the same of a tension, as a share of the larger one
+BENT = 0.02  # sine of the angle at which a straight line meets a surface, from which a path is not taut
+TURN, JUMP = (
+    1e-2,
+    1e-4,
+)  # [rad] a rotation that needs a reason; [m] a change of length over 1e-4 rad that is a jump
+LOSS = 1e-3  # [J] change of a passive motion's energy that disproves the motion
 SHORT_ARC = 1e-6  # [m] an arc shorter than its chord by more is wrong
 UNEXPLAINED = "not explained"
 
@@ -93,6 +101,7 @@ def verify(
     """
     imported = ImportedModel(model)
     every = {
+        "coordinate": Quantity("coordinates that are set, or follow", "rad, m", 1e-9),
         "position": Quantity("position of bodies", "m", 1e-9),
         "rotation": Quantity("rotation of bodies", "rad", 1e-9),
         "mass": Quantity("reduced mass matrix, share of its diagonal", "", 1e-9),
@@ -110,29 +119,72 @@ def verify(
         found.missing.append(f"paths that the imported model does not have: {', '.join(lost)}")
     for k, pose in enumerate(reference.poses):
         ours = imported.at(pose, reference.independent, reference.activations)
-        _compare_bodies(every, pose, ours, k)
+        _compare_bodies(every, found, pose, ours, k)
         _compare_paths(every, found, imported, pose, ours, k)
         if progress is not None:
             progress(k + 1, len(reference.poses))
     for name, motion in (("passive motion", reference.passive), ("driven motion", reference.driven)):
         if motion is not None:
-            _compare_motion(every, imported, name, motion)
+            _compare_motion(every, found, imported, name, motion)
+    found.missing += _not_compared(reference, imported)
     found.quantities = [quantity for quantity in every.values() if quantity.count]
     return found
 
 
-def _compare_bodies(every: dict[str, Quantity], pose: PoseNumbers, ours: ImportedNumbers, k: int) -> None:
+def _not_compared(reference: Reference, imported: ImportedModel) -> list[str]:
+    """Return sentences on what was not compared, and why."""
+    lost = []
+    if not reference.poses:
+        return ["nothing: the numbers have no pose"]
+    first = reference.poses[0]
+    known = {imported.model.body(i).name for i in range(imported.model.nbody)}
+    if missing := [name for name in first.bodies if name not in known]:
+        lost.append(f"bodies that the imported model does not have: {', '.join(missing)}")
+    if first.mass is None and first.coordinates:
+        lost.append(
+            "the reduced mass matrix: closed loops leave no coordinates that others follow, or none moves freely"
+        )
+    elif first.mass is not None and imported.at(first, reference.independent, []).mass is None:
+        lost.append("the reduced mass matrix: a coordinate is not a joint of its own")
+    joints = set(imported.muscles.coordinates)
+    if first.moment_arms and (shown := [name for name in reference.independent if name not in joints]):
+        lost.append(f"moment arms about {', '.join(shown)}: not independent joints of the imported model")
+    return lost
+
+
+def _compare_bodies(
+    every: dict[str, Quantity], found: Verification, pose: PoseNumbers, ours: ImportedNumbers, k: int
+) -> None:
+    apart = 0.0
+    for name, value in pose.coordinates.items():
+        if name in ours.coordinates:
+            gap = ours.coordinates[name] - value
+            apart = max(apart, abs(gap))
+            every["coordinate"].add(gap, f"{name}, pose {k}")
+    why = f"{UNEXPLAINED}: the same coordinates"
+    if apart > LARGE:
+        why = f"coordinates differ by up to {apart:.2g} rad or m: constraints that setting by name does not satisfy"
     for name, place in pose.bodies.items():
+        if name not in ours.bodies:
+            continue
         theirs, mine = np.array(place), ours.bodies[name]
-        every["position"].add(float(np.abs(mine[:3] - theirs[:3]).max()), f"{name}, pose {k}")
+        shift = float(np.abs(mine[:3] - theirs[:3]).max())
+        every["position"].add(shift, f"{name}, pose {k}")
         turn = mine[3:].reshape(3, 3) @ theirs[3:].reshape(3, 3).T
         skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
         angle = float(np.arctan2(np.linalg.norm(skew), 0.5 * (np.trace(turn) - 1.0)))
         every["rotation"].add(angle, f"{name}, pose {k}")
+        if not shift <= LARGE:
+            found.differences.append(Difference("position", name, k, 0.0, shift, "m", why))
+        if not angle <= TURN:
+            found.differences.append(Difference("rotation", name, k, 0.0, angle, "rad", why))
     if pose.mass is not None and ours.mass is not None:
         theirs = np.array(pose.mass)
         scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
-        every["mass"].add(float((np.abs(ours.mass - theirs) / scale).max()), f"pose {k}")
+        share = float((np.abs(ours.mass - theirs) / scale).max())
+        every["mass"].add(share, f"pose {k}")
+        if not share <= RELATIVE:
+            found.differences.append(Difference("mass", "reduced mass matrix", k, 0.0, share, "", why))
 
 
 def _compare_paths(
@@ -154,10 +206,14 @@ def _compare_paths(
                 Difference("length", name, k, theirs, mine, "m", _reason(name, pose, ours, mine - theirs))
             )
         for coordinate, arm in pose.moment_arms.get(name, {}).items():
+            if coordinate not in ours.moment_arms[name]:
+                continue
             own = ours.moment_arms[name][coordinate]
             every["wrapped arm" if touches else "arm"].add(own - arm, f"{name} about {coordinate}, pose {k}")
             if not abs(own - arm) <= LARGE:
-                why = _reason(name, pose, ours, mine - theirs)
+                why = _arm_reason(name, coordinate, arm, own, pose) or _reason(
+                    name, pose, ours, mine - theirs
+                )
                 about = f"{name} about {coordinate}"
                 found.differences.append(Difference("moment arm", about, k, arm, own, "m", why))
     for name, law in ours.laws.items():
@@ -169,7 +225,8 @@ def _compare_paths(
                 continue
             where = f"{name} at activation {found.reference.activations[i]:g}, pose {k}"
             every["law"].add((law[i] - tension) / strongest, where)
-            every["tension"].add((ours.tensions[name][i] - tension) / strongest, where)
+            if name in ours.tensions:
+                every["tension"].add((ours.tensions[name][i] - tension) / strongest, where)
             gap = abs(law[i] - tension)
             if not gap <= RELATIVE * max(abs(tension), 1e-3 * strongest):
                 found.differences.append(
@@ -182,27 +239,69 @@ def _compare_paths(
 def _reason(name: str, pose: PoseNumbers, ours: ImportedNumbers, gap: float) -> str:
     """Return why mjwrap's path is longer than OpenSim's by `gap` [m], as far as it can be seen."""
     contacts = pose.wraps.get(name, {})
-    short = {o: chord - arc for o, (arc, chord) in contacts.items() if arc < chord - SHORT_ARC}
+    short = {o: chord - arc for o, (arc, chord, _) in contacts.items() if arc < chord - SHORT_ARC}
     if short:
-        which = ", ".join(f"{o} by {1e3 * size:.2f} mm" for o, size in short.items())
-        return f"OpenSim's arc is shorter than its own chord on {which}"
+        return f"OpenSim's arc is shorter than its own chord on {', '.join(short)}"
     if name in ours.statuses:
         return f"mjwrap has no path: {ours.statuses[name]}"
+    bent = {o: numbers[2] for o, numbers in contacts.items() if numbers[2] > BENT}
+    if bent:
+        which = ", ".join(
+            f"{o} at {np.degrees(np.arcsin(min(sine, 1.0))):.1f} degrees" for o, sine in bent.items()
+        )
+        return f"OpenSim's path is not taut: its straight line meets {which}, where a string is tangent"
+    for coordinate, sides in pose.slopes.get(name, {}).items():
+        jump = max(map(abs, sides)) * STEP
+        if jump > JUMP:
+            return f"OpenSim's length jumps by {1e3 * jump:.2f} mm as {coordinate} moves by {STEP:g}"
     if contacts and not ours.touched[name]:
         return f"OpenSim wraps {', '.join(contacts)}; the geodesic has lifted off"
     if ours.touched[name] and not contacts:
         return "the geodesic touches a surface that OpenSim's path does not wrap"
-    if len(contacts) > 1:
-        return "several surfaces: OpenSim's classic path wraps one after the other and stops at 0.5 mm"
     return f"{UNEXPLAINED}: the geodesic is {'longer' if gap > 0 else 'shorter'}"
 
 
+def _arm_reason(name: str, coordinate: str, arm: float, own: float, pose: PoseNumbers) -> str:
+    """Return a reason why moment arms differ that OpenSim's own lengths give, or an empty string."""
+    sides = pose.slopes.get(name, {}).get(coordinate)
+    if sides is None:
+        return ""
+    slope = -0.5 * (sides[0] + sides[1])
+    if abs(slope - arm) <= 0.5 * abs(own - arm):
+        return ""
+    near = ", and mjwrap's is" if abs(slope - own) <= LARGE else ""
+    return f"OpenSim's moment arm is not the slope of its own length{near}"
+
+
 def _compare_motion(
-    every: dict[str, Quantity], imported: ImportedModel, name: str, motion: MotionNumbers
+    every: dict[str, Quantity], found: Verification, imported: ImportedModel, name: str, motion: MotionNumbers
 ) -> None:
-    ours = imported.motion(motion)
+    try:
+        ours, change = imported.motion(motion)
+    except StateError as error:
+        found.missing.append(f"the {name}: {error}")
+        return
     quantity = Quantity(f"coordinates in the {name}, {motion.time[-1]:g} s", "rad, m", 1e-4)
+    lost = abs(motion.energy[-1] - motion.energy[0]) if motion.energy else 0.0
     for coordinate, values in ours.items():
         theirs = np.array(motion.coordinates[coordinate])
-        quantity.add(float(np.abs(values - theirs).max()), coordinate)
+        k = int(np.argmax(np.abs(values - theirs)))
+        gap = float(values[k] - theirs[k])
+        quantity.add(gap, coordinate)
+        if not abs(gap) <= LARGE:
+            why = f"{UNEXPLAINED}: motion"
+            if lost > LOSS and abs(change) < 0.01 * lost:
+                why = f"OpenSim's motion changes its energy by {lost:.2g} J, mjwrap's by {abs(change):.1g} J"
+            elif motion.excitation is not None and (off := _pulling_apart(every)):
+                why = f"muscles pull along different paths (lengths differ by up to {1e3 * off:.2g} mm)"
+            place = f"{coordinate}, {motion.time[k]:g} s"
+            found.differences.append(
+                Difference(name, place, 0, float(theirs[k]), float(values[k]), "rad, m", why)
+            )
     every[name] = quantity
+
+
+def _pulling_apart(every: dict[str, Quantity]) -> float:
+    """Return the largest difference of a length [m] if it is one that changes a motion, else 0."""
+    largest = max(every["wrapped"].largest, every["straight"].largest)
+    return largest if largest > 1e-4 else 0.0

@@ -9,8 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjwrap.mjcf.coordinate_functions import read_coordinate_functions
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.bench import simulate_muscle
-from mjwrap.osim.coordinates import set_coordinates
+from mjwrap.osim.coordinates import coordinates, set_coordinates
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
 from mjwrap.system import MuscleSystem
 
@@ -18,6 +20,7 @@ Array = NDArray[np.float64]
 # OpenSim's reference motions have gravity and, if driven, muscles. MuJoCo's other forces are switched off by these
 # flags, and springs and dampers by their constants, as couplings in pieces need a passive stage.
 DRIVEN_OFF = ("LIMIT", "CONTACT")
+CLOSED = 1e-6  # largest rate of a constraint's error in a motion that satisfies it
 PASSIVE_OFF = (*DRIVEN_OFF, "ACTUATION")
 SPRINGS = ("jnt_stiffness", "dof_damping", "tendon_stiffness", "tendon_damping")
 
@@ -34,6 +37,7 @@ class ImportedNumbers:
     tensions: dict[str, Array]  # along the path's own length
     laws: dict[str, Array]  # of the same law, at OpenSim's path length
     touched: dict[str, bool]  # whether the path touches a surface
+    coordinates: dict[str, float]
 
 
 class ImportedModel:
@@ -44,39 +48,44 @@ class ImportedModel:
         self.data = mujoco.MjData(model)
         self.muscles = MuscleSystem(model)
         self._joints = {model.joint(i).name: i for i in range(model.njnt)}
+        own = [name for name, function in read_coordinate_functions(model).items() if function.own]
+        self.settable = [*self.muscles.coordinates, *own]
 
     def at(self, pose: PoseNumbers, independent: list[str], activations: list[float]) -> ImportedNumbers:
         """Return the numbers at a pose of OpenSim's; coordinates that follow others by a function are not set."""
         model, data, muscles = self.model, self.data, self.muscles
         mujoco.mj_resetData(model, data)
-        free = [name for name in muscles.coordinates if name in pose.coordinates]
+        free = [name for name in self.settable if name in pose.coordinates]
         set_coordinates(model, data, {name: pose.coordinates[name] for name in free})
         mujoco.mj_forward(model, data)
         muscles.reset(data)
         muscles.forward(data)
         bodies = {
-            name: np.concatenate([data.body(name).xpos, data.body(name).xmat.ravel()]) for name in pose.bodies
+            name: np.concatenate([data.body(name).xpos, data.body(name).xmat.ravel()])
+            for name in pose.bodies
+            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
         touched = {name: len(muscles.contact_points(i)) > 0 for i, name in enumerate(muscles.names)}
         arms: dict[str, dict[str, float]] = {}
         if pose.moment_arms:
-            found = muscles.moment_arms(data, independent)
+            known = set(muscles.coordinates)
+            about = [name for name in independent if name in known]
+            found = muscles.moment_arms(data, about)
             arms = {
-                name: dict(zip(independent, found[i].tolist(), strict=True))
-                for i, name in enumerate(muscles.names)
+                name: dict(zip(about, found[i].tolist(), strict=True)) for i, name in enumerate(muscles.names)
             }
         tensions, laws = {}, {}
         for name in pose.tensions:
             if name not in muscles:
                 continue
             law = muscles[name].parameters
-            tensions[name] = self._tension(law, lengths[name], activations)
+            if name not in statuses:
+                tensions[name] = self._tension(law, lengths[name], activations)
             laws[name] = self._tension(law, pose.lengths[name], activations)
-        return ImportedNumbers(
-            bodies, self._mass(independent), lengths, statuses, arms, tensions, laws, touched
-        )
+        values, mass = coordinates(model, data), self._mass(independent)
+        return ImportedNumbers(bodies, mass, lengths, statuses, arms, tensions, laws, touched, values)
 
     def _tension(self, law: object, length: float, activations: list[float]) -> Array:
         """Return the tension at rest at each activation [N]."""
@@ -90,7 +99,7 @@ class ImportedModel:
         """Return NᵀMN about the rates of the independent coordinates, N from MuJoCo's equalities; None where these
         leave other motions free, or a coordinate is no joint."""
         model, data = self.model, self.data
-        if any(name not in self._joints for name in independent):
+        if model.nv == 0 or any(name not in self._joints for name in independent):
             return None
         chosen = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
         follow = np.setdiff1d(np.arange(model.nv), chosen)
@@ -104,9 +113,9 @@ class ImportedModel:
         n[chosen, np.arange(len(chosen))] = 1.0
         if follow.size:
             solved, _, rank, _ = np.linalg.lstsq(jacobian[:, follow], -jacobian[:, chosen], rcond=None)
-            if rank < follow.size:
-                return None
             n[follow] = solved
+            if rank < follow.size or np.abs(jacobian @ n).max(initial=0.0) > CLOSED:
+                return None
         inertia = np.zeros(model.nv)
         moments = []
         for column in n.T:
@@ -114,37 +123,49 @@ class ImportedModel:
             moments.append(inertia.copy())
         return n.T @ np.array(moments).reshape(-1, model.nv).T
 
-    def motion(self, given: MotionNumbers, timestep: float | None = None) -> Mapping[str, Array]:
-        """Return the coordinates (frames,) along the motion that starts as OpenSim's did.
+    def motion(
+        self, given: MotionNumbers, timestep: float | None = None
+    ) -> tuple[Mapping[str, Array], float]:
+        """Return the coordinates (frames,) along the motion that starts as OpenSim's did, and the change of energy [J].
 
-        timestep [s]: None for the model's own. A passive motion is that without muscles.
+        timestep [s]: None for the model's own. A passive motion is that without muscles; the energy is NaN for others.
         """
         model = self.model
-        before = model.opt.timestep
+        before, flags = model.opt.timestep, int(model.opt.enableflags)
+        model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
         if timestep is not None:
             model.opt.timestep = timestep
         try:
             return self._motion(given)
         finally:
-            model.opt.timestep = before
+            model.opt.timestep, model.opt.enableflags = before, flags
 
-    def _motion(self, given: MotionNumbers) -> Mapping[str, Array]:
+    def _motion(self, given: MotionNumbers) -> tuple[Mapping[str, Array], float]:
         model, muscles = self.model, self.muscles
         data = mujoco.MjData(model)
-        mujoco.mj_resetData(model, data)
-        muscles.reset(data)
         passive = given.excitation is None
-        names = [name for name in given.coordinates if name in self._joints]
-        places = [int(model.jnt_qposadr[self._joints[name]]) for name in names]
-        rows = np.zeros((len(given.time), len(names)))
+        if passive:
+            free = {n: given.coordinates[n][0] for n in self.settable if n in given.coordinates}
+            set_coordinates(model, data, free)
+            for name in muscles.coordinates:
+                data.qvel[model.jnt_dofadr[self._joints[name]]] = given.speeds.get(name, 0.0)
+            couplings = CoupledJoints(model)
+            data.qvel[:] = couplings.matrix(data.qpos) @ data.qvel[couplings.independent]
+        muscles.reset(data)
         if not passive:
             self._start(data, given)
-        for k, time in enumerate(given.time):
+        mujoco.mj_forward(model, data)
+        energy = float(data.energy.sum())
+        rows: dict[str, list[float]] = {}
+        for time in given.time:
             steps = round((time - data.time) / model.opt.timestep)
             if steps > 0:
                 self._step(data, steps, PASSIVE_OFF if passive else DRIVEN_OFF)
-            rows[k] = data.qpos[places]
-        return {name: rows[:, i] for i, name in enumerate(names)}
+            for name, value in coordinates(model, data).items():
+                rows.setdefault(name, []).append(value)
+        mujoco.mj_forward(model, data)
+        change = float(data.energy.sum()) - energy if passive else float("nan")
+        return {name: np.array(rows[name]) for name in given.coordinates if name in rows}, change
 
     def _step(self, data: mujoco.MjData, steps: int, off: tuple[str, ...]) -> None:
         """Step with some of MuJoCo's forces switched off, by the names of their flags."""

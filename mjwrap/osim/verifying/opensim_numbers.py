@@ -1,4 +1,4 @@
-"""Compute a `Reference` with the opensim package: the only file that imports it."""
+"""Compute a `Reference` with the opensim package."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
+from mjwrap.osim.verifying.opensim_motions import coordinate_places, opensim_motion
+from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
 
 Array = NDArray[np.float64]
@@ -20,8 +22,8 @@ WIDEST = {
     1: math.pi,
     2: 1.0,
 }  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
-ACCURACY = 1e-9  # of OpenSim's integrator
-PASSIVE, DRIVEN, INTERVAL = 0.3, 0.5, 0.01  # durations of motions, and the time between their frames [s]
+CLOSED = 1e-6  # largest rate of a constraint's error in a motion that satisfies it
+PASSIVE, DRIVEN = 0.3, 0.5  # durations of motions [s]
 EXCITATION = 0.2
 
 
@@ -83,7 +85,14 @@ class _Computer:
         self.muscles = {muscles.get(i).getName(): muscles.get(i) for i in range(muscles.getSize())}
         bodies = self.model.getBodySet()
         self.bodies = {bodies.get(i).getName(): bodies.get(i) for i in range(bodies.getSize())}
-        self._places = self._find_places()
+        self._places = coordinate_places(self.state, self.coordinates)
+        self._movable = {name: self.coordinates[name] for name in self.independent}
+        every_path = {name: path_of(force) for name, force in self.paths.items()}
+        self._curved = {  # whose lengths may jump
+            name: path
+            for name, path in every_path.items()
+            if hasattr(path, "getWrapSet") and path.getWrapSet().getSize()
+        }
 
     def compute(
         self,
@@ -137,37 +146,22 @@ class _Computer:
             ]
         values = {name: float(c.getValue(state)) for name, c in self.coordinates.items()}
         mass = self._mass()
-        lengths = {name: float(_path(found).getLength(state)) for name, found in self.paths.items()}
+        lengths = {name: float(path_of(found).getLength(state)) for name, found in self.paths.items()}
         arms: dict[str, dict[str, float]] = {}
         if with_arms:
             for name, found in self.paths.items():
-                path = _path(found)
+                path = path_of(found)
                 arms[name] = {
                     c: float(path.computeMomentArm(state, self.coordinates[c])) for c in self.independent
                 }
         tensions = {name: self._tensions(muscle) for name, muscle in self.muscles.items()}
-        wraps = {name: found for name, force in self.paths.items() if (found := self._contacts(_path(force)))}
-        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps)
-
-    def _contacts(self, path: Any) -> dict[str, list[float]]:
-        """Return arc and chord [m] of the contacts of a path, by wrap object."""
-        if not hasattr(path, "getCurrentPath"):
-            return {}
-        points = path.getCurrentPath(self.state)
-        found: dict[str, list[float]] = {}
-        before: Array | None = None
-        for i in range(points.getSize()):
-            point = self.opensim.PathWrapPoint.safeDownCast(points.get(i))
-            if point is None or point.getWrapObject() is None:
-                before = None
-                continue
-            here = point.getLocationInGround(self.state)
-            place = np.array([here.get(k) for k in range(3)])
-            if before is not None:
-                chord = float(np.linalg.norm(place - before))
-                found[point.getWrapObject().getName()] = [float(point.getWrapLength(self.state)), chord]
-            before = place if before is None else None
-        return found
+        wraps = {
+            name: found
+            for name, force in self.paths.items()
+            if (found := contacts(self.opensim, path_of(force), state))
+        }
+        slopes = length_slopes(model, state, self._curved, self._movable) if with_arms else {}
+        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes)
 
     def _tensions(self, muscle: Any) -> list[float | None]:
         """Return the tension of a muscle at equilibrium, at rest, at each of the activations."""
@@ -206,9 +200,11 @@ class _Computer:
         if follow:
             of_rates = g @ inverse
             solved, _, rank, _ = np.linalg.lstsq(of_rates[:, follow], -of_rates[:, chosen], rcond=None)
-            if rank < len(follow):
-                return None
             n[follow] = solved
+            if rank < len(follow) or np.abs(of_rates @ n).max(initial=0.0) > CLOSED:
+                return None
+        elif rows and np.abs(g @ inverse @ n).max(initial=0.0) > CLOSED:
+            return None
         reduced = (inverse @ n).T @ m @ (inverse @ n)
         return reduced.tolist()
 
@@ -227,74 +223,11 @@ class _Computer:
         self.model.realizeVelocity(state)
         return found
 
-    def _find_places(self) -> list[int]:
-        """Return the place of each coordinate in OpenSim's vector q."""
-        found = []
-        for coordinate in self.coordinates.values():
-            value = float(coordinate.getValue(self.state))
-            before = self._q()
-            locked = coordinate.getLocked(self.state)
-            coordinate.setLocked(self.state, False)
-            coordinate.setValue(self.state, value + 0.125, False)
-            found.append(int(np.argmax(np.abs(self._q() - before))))
-            coordinate.setValue(self.state, value, False)
-            coordinate.setLocked(self.state, locked)
-        return found
-
-    def _q(self) -> Array:
-        q = self.state.getQ()
-        return np.array([q.get(i) for i in range(q.size())])
-
     def _motion(self, excitation: float | None, duration: float) -> MotionNumbers | None:
-        """Return the motion from the default pose at rest, or None (with a note) where OpenSim fails."""
-        opensim = self.opensim
-        model = opensim.Model(str(self.path))
-        model.set_assembly_accuracy(1e-12)
-        forces = model.updForceSet()
-        for i in range(forces.getSize()):
-            muscle = opensim.Muscle.safeDownCast(forces.get(i))
-            if excitation is None or muscle is None:
-                forces.get(i).set_appliesForce(False)
-        controllers = model.updControllerSet()
-        for i in range(controllers.getSize()):
-            controllers.get(i).setEnabled(False)
-        if excitation is not None:
-            controller = opensim.PrescribedController()
-            controller.setName("mjwrap_excitation")
-            for name in self.muscles:
-                muscle = model.getMuscles().get(name)
-                controller.addActuator(muscle)
-                controller.prescribeControlForActuator(muscle.getName(), opensim.Constant(excitation))
-            model.addController(controller)
-        kind = "passive" if excitation is None else "driven"
+        """Return a motion, or None, with a note, where OpenSim fails."""
         try:
-            state = model.initSystem()
-            if excitation is not None:
-                model.equilibrateMuscles(state)
-            every = model.getCoordinateSet()
-            coordinates = {every.get(i).getName(): every.get(i) for i in range(every.getSize())}
-            muscles = {name: model.getMuscles().get(name) for name in self.muscles}
-            activation = (
-                {} if excitation is None else {n: float(m.getActivation(state)) for n, m in muscles.items()}
-            )
-            fiber = (
-                {} if excitation is None else {n: float(m.getFiberLength(state)) for n, m in muscles.items()}
-            )
-            manager = opensim.Manager(model)
-            manager.setIntegratorAccuracy(ACCURACY)
-            manager.initialize(state)
-            times = INTERVAL * np.arange(round(duration / INTERVAL) + 1)
-            rows: dict[str, list[float]] = {name: [] for name in coordinates}
-            for time in times:
-                if time > 0.0:
-                    state = manager.integrate(float(time))
-                for name, coordinate in coordinates.items():
-                    rows[name].append(float(coordinate.getValue(state)))
+            return opensim_motion(self.opensim, self.path, excitation, duration, seed=1)
         except RuntimeError as error:
-            self.notes.append(f"the {kind} motion: {' '.join(str(error).split())[:200]}")
+            kind = "passive" if excitation is None else "driven"
+            self.notes.append(f"the {kind} motion: OpenSim says {' '.join(str(error).split())[:200]}")
             return None
-        return MotionNumbers(times.tolist(), rows, excitation, activation, fiber)
-
-
-def _path(force: Any) -> Any:
-    return force.getGeometryPath() if hasattr(force, "getGeometryPath") else force.get_GeometryPath()

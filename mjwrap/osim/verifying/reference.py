@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import OsimError
 
 Array = NDArray[np.float64]
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -29,18 +29,25 @@ class PoseNumbers:
     lengths: dict[str, float]  # of all paths [m]
     moment_arms: dict[str, dict[str, float]]  # by path and independent coordinate [m]
     tensions: dict[str, list[float | None]]  # by muscle, at rest and the activations of `Reference` [N]
-    wraps: dict[str, dict[str, list[float]]]  # by path and wrap object: arc and chord of its contact [m]
+    wraps: dict[
+        str, dict[str, list[float]]
+    ]  # by path and wrap object: arc and chord of its contact [m], and its kink
+    slopes: dict[
+        str, dict[str, list[float]]
+    ]  # by path over surfaces and coordinate: slopes of the length on either side
 
 
 @dataclass(frozen=True)
 class MotionNumbers:
-    """A motion from the default pose at rest; excitation: the same of all muscles, None: no force but gravity."""
+    """A motion; excitation: the same of all muscles, None: no force but gravity acts."""
 
     time: list[float]  # [s]
     coordinates: dict[str, list[float]]
     excitation: float | None = None
     activation: dict[str, float] = field(default_factory=dict)  # at the start
     fiber_length: dict[str, float] = field(default_factory=dict)  # at the start [m]
+    speeds: dict[str, float] = field(default_factory=dict)  # at the start [rad/s, m/s]
+    energy: list[float] = field(default_factory=list)  # kinetic and potential, of a passive motion [J]
 
 
 @dataclass(frozen=True)
@@ -76,12 +83,57 @@ def read_reference(path: str | Path) -> Reference:
         raise OsimError(f"cannot read '{path}': {(error.strerror or str(error)).lower()}") from None
     except ValueError:
         raise OsimError(f"'{path}' is not a file of OpenSim's numbers: it is not JSON") from None
+    if isinstance(given, dict) and given.get("format", FORMAT) != FORMAT:
+        raise OsimError(f"'{path}' was written by another version of mjwrap: compute the numbers anew")
     try:
-        if given.pop("format") != FORMAT:
-            raise OsimError(f"'{path}' was written by another version of mjwrap: compute the numbers anew")
+        del given["format"]
         given["poses"] = [PoseNumbers(**pose) for pose in given["poses"]]
         for motion in ("passive", "driven"):
             given[motion] = None if given[motion] is None else MotionNumbers(**given[motion])
-        return Reference(**given)
-    except (AttributeError, KeyError, TypeError):
-        raise OsimError(f"'{path}' is not a file of OpenSim's numbers: entries are missing") from None
+        found = Reference(**given)
+        fault = _fault(found)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise OsimError(
+            f"'{path}' is not a file of OpenSim's numbers: entries are missing or damaged"
+        ) from None
+    if fault:
+        raise OsimError(f"'{path}' is not a file of OpenSim's numbers: {fault}")
+    return found
+
+
+def _fault(found: Reference) -> str:
+    """Return what is wrong with the shapes and numbers of a reference, or an empty string."""
+    count = len(found.activations)
+    for k, pose in enumerate(found.poses):
+        checked: list[tuple[str, object, tuple[int, ...]]] = [
+            ("coordinates", list(pose.coordinates.values()), (len(pose.coordinates),)),
+            ("lengths", list(pose.lengths.values()), (len(pose.lengths),)),
+            ("bodies", list(pose.bodies.values()), (len(pose.bodies), 12) if pose.bodies else (0,)),
+            ("moment arms", [a for arms in pose.moment_arms.values() for a in arms.values()], (-1,)),
+        ]
+        checked += [("wraps", w, (3,)) for wraps in pose.wraps.values() for w in wraps.values()]
+        checked += [("slopes", s, (2,)) for slopes in pose.slopes.values() for s in slopes.values()]
+        checked += [
+            ("tensions", [0.0 if t is None else t for t in ts], (count,)) for ts in pose.tensions.values()
+        ]
+        if pose.mass is not None:
+            checked.append(("mass", pose.mass, (len(found.independent),) * 2))
+        for what, values, shape in checked:
+            if not _fits(values, shape, finite=what != "wraps"):
+                return f"{what} of pose {k} have a wrong size or are not numbers"
+        if missing := [name for name in found.independent if name not in pose.coordinates]:
+            return f"pose {k} lacks coordinate '{missing[0]}'"
+    for motion in (found.passive, found.driven):
+        for name, values in ({} if motion is None else motion.coordinates).items():
+            if motion is not None and not _fits(values, (len(motion.time),)):
+                return f"coordinate '{name}' of a motion has a wrong size or is not a number"
+    return ""
+
+
+def _fits(values: object, shape: tuple[int, ...], finite: bool = True) -> bool:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except ValueError:  # rows of different lengths
+        return False
+    fits = array.ndim == len(shape) and all(w in (-1, n) for w, n in zip(shape, array.shape, strict=True))
+    return fits and bool(not finite or np.isfinite(array).all())
