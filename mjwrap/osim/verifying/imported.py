@@ -15,8 +15,8 @@ from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
-# OpenSim's reference motions have gravity and, if driven, muscles. MuJoCo's other forces are switched off by these flags,
-# and springs and dampers by their constants, as couplings in pieces need a passive stage.
+# OpenSim's reference motions have gravity and, if driven, muscles. These flags switch MuJoCo's other forces off. Springs and
+# dampers are switched off by their constants, because couplings in pieces need a passive stage.
 DRIVEN_OFF = ("LIMIT", "CONTACT")
 PASSIVE_OFF = (*DRIVEN_OFF, "ACTUATION")
 SPRINGS = ("jnt_stiffness", "dof_damping", "tendon_stiffness", "tendon_damping")
