@@ -32,6 +32,7 @@ DEMO_PLOT = "out/elbow.png"
 FOLDERS = {3: ".venv", 4: ".venv-mujoco4"}
 DEMO_EXTRAS = {"demo", "myo"}
 TEST_EXTRAS = {3: {"demo", "dev", "myo", "test"}, 4: {"demo", "test"}}
+ON_ALL_CORES = ("-n", "auto", "--dist", "loadfile")  # whole files, because the tests of one share what they make
 PINS = {3: "mujoco<4", 4: "mujoco>=4"}
 
 
@@ -183,10 +184,11 @@ def has_screen() -> bool:
 
 
 def run_tests(mujoco: int, arguments: "list[str]") -> int:
-    """Run pytest with `arguments`; its exit code is returned."""
+    """Run pytest with `arguments`, files side by side on all cores; its exit code is returned."""
     python = prepare(TEST_EXTRAS[mujoco], mujoco)
-    say(f"running pytest {' '.join(arguments)}".rstrip())
-    return subprocess.run([str(python), "-m", "pytest", *arguments], cwd=ROOT, env=environment()).returncode
+    command = ["pytest", *ON_ALL_CORES, *arguments]  # a -n among the arguments counts more
+    say(f"running {' '.join(command)}")
+    return subprocess.run([str(python), "-m", *command], cwd=ROOT, env=environment()).returncode
 
 
 def main(argv: "list[str] | None" = None) -> int:

@@ -57,7 +57,7 @@ def alone(function: Callable[..., Any], *arguments: Any) -> Any:
         return pool.submit(function, *arguments).result()
 
 
-def write(path: Path, records: dict[str, Any]) -> None:
+def write(path: Path, records: Any) -> None:
     about = {
         "made by": "benchmarks/osim/freeze_poses.py",
         "OpenSim": opensim.GetVersion(),
@@ -230,8 +230,9 @@ def compare(paths: list[Path]) -> None:
                 ours = [*frames[name].position, *frames[name].rotation.ravel()]
                 worst = max(worst, float(np.abs(np.subtract(ours, numbers)).max()))
             for force in model.forces:
-                if force.name in record["lengths"] and hasattr(force, "path"):
-                    difference = path_length(force.path, poses, values) - record["lengths"][force.name]
+                route = getattr(force, "path", None)
+                if force.name in record["lengths"] and route is not None:
+                    difference = path_length(route, poses, values) - record["lengths"][force.name]
                     longest, lengths = max(longest, abs(difference)), lengths + 1
         print(f"{path.name:45s} poses {worst:8.1e}   lengths {longest:8.1e} ({lengths})")
 
