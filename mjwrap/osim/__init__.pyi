@@ -2,5 +2,6 @@
 
 from .coordinates import coordinates as coordinates
 from .coordinates import set_coordinates as set_coordinates
+from .motions import motion_table as motion_table
 
 __all__: list[str]

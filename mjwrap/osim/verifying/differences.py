@@ -199,7 +199,7 @@ def _compare_paths(
         mine = ours.lengths.get(name)
         if mine is None:
             continue
-        touches = ours.touched[name] or name in pose.wraps
+        touches = ours.touched[name] > 0 or name in pose.wraps
         every["wrapped" if touches else "straight"].add(mine - theirs, f"{name}, pose {k}")
         if not abs(mine - theirs) <= LARGE:
             found.differences.append(
@@ -258,6 +258,8 @@ def _reason(name: str, pose: PoseNumbers, ours: ImportedNumbers, gap: float) -> 
         return f"OpenSim wraps {', '.join(contacts)}; the geodesic has lifted off"
     if ours.touched[name] and not contacts:
         return "the geodesic touches a surface that OpenSim's path does not wrap"
+    if ours.touched[name] != len(contacts):
+        return f"the geodesic touches {ours.touched[name]} surfaces, OpenSim's path {len(contacts)}"
     return f"{UNEXPLAINED}: the geodesic is {'longer' if gap > 0 else 'shorter'}"
 
 
@@ -293,7 +295,7 @@ def _compare_motion(
             if lost > LOSS and abs(change) < 0.01 * lost:
                 why = f"OpenSim's motion changes its energy by {lost:.2g} J, mjwrap's by {abs(change):.1g} J"
             elif motion.excitation is not None and (off := _pulling_apart(every)):
-                why = f"muscles pull along different paths (lengths differ by up to {1e3 * off:.2g} mm)"
+                why = f"{UNEXPLAINED}: motion; lengths of paths differ, too, by up to {1e3 * off:.2g} mm"
             place = f"{coordinate}, {motion.time[k]:g} s"
             found.differences.append(
                 Difference(name, place, 0, float(theirs[k]), float(values[k]), "rad, m", why)

@@ -36,7 +36,7 @@ class ImportedNumbers:
     moment_arms: dict[str, dict[str, float]]
     tensions: dict[str, Array]  # along the path's own length
     laws: dict[str, Array]  # of the same law, at OpenSim's path length
-    touched: dict[str, bool]  # whether the path touches a surface
+    touched: dict[str, int]  # how many surfaces the path touches
     coordinates: dict[str, float]
 
 
@@ -67,7 +67,7 @@ class ImportedModel:
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
-        touched = {name: len(muscles.contact_points(i)) > 0 for i, name in enumerate(muscles.names)}
+        touched = {name: len(muscles.contact_points(i)) for i, name in enumerate(muscles.names)}
         arms: dict[str, dict[str, float]] = {}
         if pose.moment_arms:
             known = set(muscles.coordinates)
