@@ -27,6 +27,7 @@ from mjwrap.kernels.spans.lift_off_touchdown import (
     touchdown,
 )
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions
+from mjwrap.kernels.spans.span_ends import lies_on_surfaces
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
 
@@ -52,7 +53,9 @@ GROUP_STEP = 3  # number of obstacles from the start of one group to the start o
 GROUP_NEIGHBOURS = 2  # obstacles on each side of a group that are wrapped again, too
 PATTERNS = 12  # number of random patterns of hints where the row is a single group
 PATTERNS_PER_GROUP = 8  # number of random patterns for each group of a longer row
-EXTRA_PATTERNS = 4  # factor on these numbers while there is no path, or none in range
+EXTRA_PATTERNS = (
+    4  # factor on these numbers while there is no path, or none in range, and no end inside a surface
+)
 UNTOUCHED_CHANCE = 0.25  # probability that a pattern leaves an obstacle untouched
 
 
@@ -243,6 +246,8 @@ def try_random_hints(lo, hi, ends, node, sound):
     spent = 0
     changed = False
     first_group = True
+    # an end inside a surface explains why there is no path
+    factor = EXTRA_PATTERNS if lies_on_surfaces(lo, hi, ends, node) else 1
     k, end = lo, lo
     while end < hi:
         end = k
@@ -250,7 +255,7 @@ def try_random_hints(lo, hi, ends, node, sound):
             end = _next_surface(end, hi, node)
         # more patterns as long as there is no path, or none in range
         most = PATTERNS if first_group and end == hi else PATTERNS_PER_GROUP
-        for pattern in range(EXTRA_PATTERNS * most):
+        for pattern in range(factor * most):
             first, last = _whole_surfaces(lo, hi, k - GROUP_NEIGHBOURS, end + GROUP_NEIGHBOURS, node)
             part = ends_of_part(lo, hi, first, last, ends, node)
             before = _penalised_length(first, last, part, node)
