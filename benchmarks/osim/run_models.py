@@ -6,7 +6,8 @@ Each model is imported, saved, loaded from the saved file and run with seeded ra
 0.05 s. Printed for each: steps per second and times real time of both, evaluations of paths by their status, warnings
 of MuJoCo, whether all numbers stayed finite, and which tests of `mjwrap check` failed. A model without muscles runs in
 MuJoCo alone. Where a run is not finite, OpenSim's own run with the same excitations, at an accuracy of 1e-5, is shown
-beside it, if the `opensim` wheel is there. Exit code 1 if a model could not be imported, or a run was not finite or gave a warning.
+beside it, if the `opensim` wheel is there. Exit code 1 if a model could not be imported, or a run was not finite or
+gave a warning.
 """
 
 from __future__ import annotations
