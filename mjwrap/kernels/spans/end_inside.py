@@ -127,9 +127,20 @@ def _has_no_substitute(lo, hi, a, b, ends, node):
 
 
 @jit
+def _holds_an_end(lo, before, after, hi, ends, node):
+    """Return whether an obstacle of lo..before contains the first end, or one of after..hi the last one."""
+    return (
+        _containing_obstacle(lo, before, ends, 3, node) >= 0
+        or _containing_obstacle(after, hi, ends, 6, node) >= 0
+    )
+
+
+@jit
 def _lift_all(lo, hi, node):
-    """Remove the contacts of rows lo..hi; their saved sides stay."""
+    """Remove the contacts of rows lo..hi; their saved sides stay, or are those of a string without length."""
     for k in range(lo, hi):
+        if node[k, S_MODE] == lay.COLD:
+            node[k, lay.S_SWEEP] = 0.0
         node[k, S_MODE] = lay.FREE
         for i in range(lay.S_P - S_MODE, lay.STATE):
             node[k, S_MODE + i] = 0.0
@@ -156,7 +167,15 @@ def substitute_path(lo, hi, ends, node, tol, direct):
         return math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2), NO_SUBSTITUTE, 0, 0
     # the path between the nearest points; leaves_a, leaves_b: it does not touch the surface at F
     moved = (gx, gy, gz, px, py, pz, qx, qy, qz)
-    status, best, error, iterations, evaluations = solve_active_set(lo, hi, moved, node, tol, direct)
+    # surfaces between an end and the one that contains it, to which the path from F would have to come back
+    before, after = lo, hi
+    if not shallow:
+        before, after = max(a, lo), surface_end(b, hi, node) if b >= 0 else hi
+    if before >= after or _holds_an_end(lo, before, after, hi, moved, node):
+        return math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2), NO_SUBSTITUTE, 0, 0
+    _lift_all(lo, before, node)
+    _lift_all(after, hi, node)
+    status, best, error, iterations, evaluations = solve_active_set(before, after, moved, node, tol, direct)
     behind = surface_end(a, hi, node) if a >= 0 else lo
     k, j = _first_and_last_contact(lo, hi, node)
     leaves_a, leaves_b = a >= 0 and not a <= k < behind, b >= 0 and j < b
@@ -175,7 +194,7 @@ def substitute_path(lo, hi, ends, node, tol, direct):
             continue
         if a == b and choice < 3:
             continue
-        first, last = behind if over_a else lo, b if over_b else hi
+        first, last = behind if over_a else before, b if over_b else after
         last = max(first, last)
         sx, sy, sz, tx, ty, tz = px, py, pz, qx, qy, qz
         if over_a:

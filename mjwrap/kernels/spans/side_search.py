@@ -244,10 +244,11 @@ def try_random_hints(lo, hi, ends, node, sound):
     The neighbours of the group are wrapped again, too. sound: the present path is certified.
     """
     spent = 0
+    # an end inside a surface explains why there is no path
+    if not sound and not lies_on_surfaces(lo, hi, ends, node):
+        return spent
     changed = False
     first_group = True
-    # an end inside a surface explains why there is no path
-    factor = EXTRA_PATTERNS if lies_on_surfaces(lo, hi, ends, node) else 1
     k, end = lo, lo
     while end < hi:
         end = k
@@ -255,7 +256,7 @@ def try_random_hints(lo, hi, ends, node, sound):
             end = _next_surface(end, hi, node)
         # more patterns as long as there is no path, or none in range
         most = PATTERNS if first_group and end == hi else PATTERNS_PER_GROUP
-        for pattern in range(factor * most):
+        for pattern in range(EXTRA_PATTERNS * most):
             first, last = _whole_surfaces(lo, hi, k - GROUP_NEIGHBOURS, end + GROUP_NEIGHBOURS, node)
             part = ends_of_part(lo, hi, first, last, ends, node)
             before = _penalised_length(first, last, part, node)
