@@ -60,21 +60,24 @@ def ran(
     """Run a model; return its figures."""
     drawn = controls(count, seconds, 0)
     found: Counter[str] = Counter()
-    began, steps, finite = time.perf_counter(), 0, True
+    began, steps, finite, reached = time.perf_counter(), 0, True, 0.0
     while data.time < seconds - 0.5 * model.opt.timestep:
         excite(drawn[min(int(data.time / HOLD + 1e-6), len(drawn) - 1)])
+        reached = data.time
         advance()
         steps += 1
         found.update(mw.Status(int(code)).name for code in statuses())
-        if not np.isfinite(data.qpos).all() or data.time < (steps - 1.5) * model.opt.timestep:
+        if not np.isfinite(data.qpos).all() or data.time <= reached:
             finite = False
             break
+    else:
+        reached = data.time
     spent = time.perf_counter() - began
     total = sum(found.values())
     return {
         "steps_per_second": steps / spent,
-        "times_real_time": data.time / spent,
-        "simulated": float(data.time),
+        "times_real_time": reached / spent,
+        "simulated": float(reached),
         "statuses": {name: n / total for name, n in found.items() if name != "CONVERGED"} if total else {},
         "finite": finite,
         "warnings": {
