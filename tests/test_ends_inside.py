@@ -154,6 +154,46 @@ def test_nothing_stands_in_where_both_ends_are_inside_one_surface_whose_wraps_ar
     assert sol.tangency_error == NO_SUBSTITUTE
 
 
+@pytest.mark.parametrize(
+    "surface", [mw.Ellipsoid((0.03, 0.05, 0.04)), mw.Capsule(0.03, 0.04)], ids=["ellipsoid", "capsule"]
+)
+def test_nothing_is_searched_for_where_no_path_can_be(surface: Any) -> None:
+    """A cold start with an end inside evaluates the substitute path only, and finds what a warm start follows."""
+    rng = np.random.default_rng(5)
+    obstacle = mw.Obstacle(surface)
+    for _ in range(40):
+        place = nearest(obstacle, rng.normal(size=3) * 0.1)[0]
+        normal, far = outward(obstacle, place)[0], np.r_[0.25, 0.1, 0.05] * rng.choice([-1.0, 1.0], 3)
+        outside = mw.solve_path(place + 1e-4 * normal, far, [obstacle])
+        cold = mw.solve_path(place - 1e-4 * normal, far, [obstacle])
+        warm = mw.solve_path(place - 1e-4 * normal, far, [obstacle], start=outside)
+        assert cold.status == warm.status == mw.Status.ENDPOINT_INSIDE
+        assert cold.length == pytest.approx(outside.length, abs=1e-3)
+        assert cold.length <= warm.length + 1e-9
+        assert cold.evaluations <= 5
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_an_end_inside_a_surface_further_on_is_on_the_path_over_that_surface_alone(back: bool) -> None:
+    """What comes between the end and the surface that contains it has no string to touch."""
+    drum, further = (
+        mw.Obstacle(mw.Ellipsoid((0.03, 0.05, 0.04))),
+        mw.Obstacle(mw.Sphere(0.01), (0.0, 0.2, 0.0)),
+    )
+    rng, found = np.random.default_rng(6), 0
+    for _ in range(40):
+        place = nearest(drum, rng.normal(size=3) * 0.1)[0]
+        inside, far = place - 0.002 * outward(drum, place)[0], np.r_[0.25, -0.1, 0.05]
+        row = [drum, further]
+        ends = (inside, far) if back else (far, inside)
+        alone = mw.solve_path(*ends, [drum])
+        path = mw.solve_path(*ends, row[::-1] if back else row)
+        if path.status == mw.Status.ENDPOINT_INSIDE and path.tangency_error < NO_SUBSTITUTE:
+            assert path.length == pytest.approx(alone.length, abs=1e-9)
+            found += any(contact.active for contact in path.contacts)
+    assert found > 5
+
+
 def test_an_end_deep_inside_goes_straight_through_to_where_it_leaves() -> None:
     """Towards the far end the way through is MuJoCo's straight line; both ends may be inside."""
     ball = [mw.Obstacle(mw.Sphere(0.05))]

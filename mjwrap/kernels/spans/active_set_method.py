@@ -32,10 +32,14 @@ from mjwrap.kernels.spans.lift_off_touchdown import (
 from mjwrap.kernels.spans.restarts import out_of_restarts, restart
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, save_solutions
 from mjwrap.kernels.spans.side_search import search_sides, try_other_sides
+from mjwrap.kernels.spans.span_ends import (
+    an_end_is_inside,
+    ends_in_short_segment,
+    has_no_path,
+    lies_on_surfaces,
+)
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED, newton
-from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
-from mjwrap.kernels.wraps.single import contains
 
 HINT, S_MODE, W_OLD, W_WRAP_ERROR = lay.HINT, lay.S_MODE, lay.W_OLD, lay.W_WRAP_ERROR
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
@@ -49,6 +53,10 @@ EXTRA_CHANGES = 4  # changes of the active set, beyond one for each obstacle, af
 @no_inline
 def solve_active_set(lo, hi, ends, node, tol, direct):
     """Find the path from the saved solution alone; as `solve_span`, but for ends outside of every surface only."""
+    # nothing is searched for where no path can be
+    if any_in_mode(lo, hi, node, COLD) and has_no_path(lo, hi, ends, node):
+        node[lo, lay.W_RESTARTS] = 0.0
+        return lay.ENDPOINT_INSIDE, path_length(lo, hi, ends, node), 0.0, 0, 0
     cold, known, evaluations = _init(lo, hi, ends, node, direct)
     iterations, restarts, changes = 0, 0, 0
     error = 0.0
@@ -71,7 +79,8 @@ def solve_active_set(lo, hi, ends, node, tol, direct):
             if changes <= hi - lo + EXTRA_CHANGES:
                 continue
         saddle = tangent and changes == 0
-        if out_of_restarts(lo, hi, restarts):
+        # an end inside a surface explains why there is no path: restarts seldom find one then
+        if out_of_restarts(lo, hi, restarts) or not lies_on_surfaces(lo, hi, ends, node):
             status = lay.NOT_MINIMAL if saddle else lay.NOT_CONVERGED
             break
         evaluations += restart(lo, hi, ends, node, restarts, saddle, cold)
@@ -186,7 +195,7 @@ def _split_or_merge_contacts(lo, hi, ends, node, tangent):
 def _terminate(lo, hi, ends, node, final, status):
     """Return the status of the last iterate; final: it is certified and needs no change."""
     if not final:
-        if _an_end_is_inside(lo, hi, ends, node):
+        if an_end_is_inside(lo, hi, ends, node):
             return lay.ENDPOINT_INSIDE
         if status == lay.NOT_MINIMAL:
             return status
@@ -195,7 +204,7 @@ def _terminate(lo, hi, ends, node, final, status):
         return lay.NOT_CONVERGED if status == lay.CONVERGED else status
     # an end inside a surface is rare and costly to find: it is tested only where the path gives a sign of it
     suspect = status == lay.PENETRATING or (status == lay.CONVERGED and ends_in_short_segment(lo, hi, node))
-    if suspect and _an_end_is_inside(lo, hi, ends, node):
+    if suspect and an_end_is_inside(lo, hi, ends, node):
         return lay.ENDPOINT_INSIDE
     if status == lay.CONVERGED and not in_range(lo, hi, ends, node):
         return lay.OUT_OF_RANGE
@@ -211,27 +220,3 @@ def _store(lo, hi, node, final, restarts):
         if final and node[k, S_MODE] == TOUCHED:
             node[k, lay.S_BEFORE] = node[k, lay.W_L]
             node[k, lay.S_BEFORE + 1] = node[k, lay.W_LQ]
-
-
-@jit
-def _an_end_is_inside(lo, hi, ends, node):
-    """Return whether an end of the span lies inside an obstacle."""
-    x, y, z = ends[0], ends[1], ends[2]
-    for k in range(lo, hi):
-        if contains(k, node, x + ends[3], y + ends[4], z + ends[5]):
-            return True
-        if contains(k, node, x + ends[6], y + ends[7], z + ends[8]):
-            return True
-    return False
-
-
-@jit
-def ends_in_short_segment(lo, hi, node):
-    """Return whether the path's first or last straight segment is so short that the end may lie inside the surface."""
-    last = -1
-    for k in range(lo, hi):
-        if node[k, S_MODE] == TOUCHED:
-            if last < 0 and node[k, lay.W_L] <= ON_SURFACE * node[k, lay.SIZE]:
-                return True
-            last = k
-    return last >= 0 and node[last, lay.W_LQ] <= ON_SURFACE * node[last, lay.SIZE]

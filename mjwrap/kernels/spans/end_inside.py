@@ -29,13 +29,14 @@ import math
 from numba.core import types
 
 from mjwrap.kernels import layout as lay
-from mjwrap.kernels.compilation.jit import deferred, from_python, jit, no_inline
-from mjwrap.kernels.geometry.dispatch import height, nearest
+from mjwrap.kernels.compilation.jit import deferred, from_python, jit
+from mjwrap.kernels.geometry.dispatch import nearest
 from mjwrap.kernels.geometry.projection import into_frame
 from mjwrap.kernels.geometry.traits import closed_form
 from mjwrap.kernels.solved.segments import G_A, G_B, G_FAR, G_NEAR, list_segments, set_pull_at_end
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
+from mjwrap.kernels.spans.span_ends import lies_on_surfaces
 from mjwrap.kernels.tangency.tangency_error import ON_SURFACE
 from mjwrap.kernels.wraps.single import contains
 
@@ -57,20 +58,6 @@ def _nearest_surface_point(k, ends, column, node):
         node[k, POS + 1] + node[k, ROT + 3] * x + node[k, ROT + 4] * y + node[k, ROT + 5] * z - ends[1],
         node[k, POS + 2] + node[k, ROT + 6] * x + node[k, ROT + 7] * y + node[k, ROT + 8] * z - ends[2],
     )
-
-
-@no_inline
-def lies_on_surfaces(lo, hi, ends, node):
-    """Return whether no end of the span lies deeper inside an obstacle than AS_WRITTEN: on its surface, or outside."""
-    for k in range(lo, hi):
-        least = -lay.AS_WRITTEN * node[k, lay.SIZE]
-        for column in range(3, 9, 3):
-            x, y, z = into_frame(
-                node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
-            )
-            if height(node, k, x, y, z) < least:
-                return False
-    return True
 
 
 @jit
@@ -125,9 +112,35 @@ def _is_past_half_way(k, ends, column, node):
 
 
 @jit
+def _has_no_substitute(lo, hi, a, b, ends, node):
+    """Return whether it is known before any search that there is no substitute path.
+
+    a, b: the obstacles inside which the ends lie, -1 where an end is outside of all.
+    """
+    # with both ends inside one surface a search may find another wrap from these nearest points than from the last ones
+    if a >= 0 and a == b and not closed_form(a, node):
+        return True
+    # an end inside a surface that is not next to it: the path has to touch that surface, and to be its path from F
+    if a > lo and _is_past_half_way(a, ends, 3, node):
+        return True
+    return b >= 0 and surface_end(b, hi, node) != hi and _is_past_half_way(b, ends, 6, node)
+
+
+@jit
+def _holds_an_end(lo, before, after, hi, ends, node):
+    """Return whether an obstacle of lo..before contains the first end, or one of after..hi the last one."""
+    return (
+        _containing_obstacle(lo, before, ends, 3, node) >= 0
+        or _containing_obstacle(after, hi, ends, 6, node) >= 0
+    )
+
+
+@jit
 def _lift_all(lo, hi, node):
-    """Remove the contacts of rows lo..hi; their saved sides stay."""
+    """Remove the contacts of rows lo..hi; their saved sides stay, or are those of a string without length."""
     for k in range(lo, hi):
+        if node[k, S_MODE] == lay.COLD:
+            node[k, lay.S_SWEEP] = 0.0
         node[k, S_MODE] = lay.FREE
         for i in range(lay.S_P - S_MODE, lay.STATE):
             node[k, S_MODE + i] = 0.0
@@ -148,21 +161,29 @@ def substitute_path(lo, hi, ends, node, tol, direct):
         px, py, pz = _nearest_surface_point(a, ends, 3, node)
     if b >= 0:
         qx, qy, qz = _nearest_surface_point(b, ends, 6, node)
+    # the path of an end that lies on the surface needs no more than to be found
+    shallow = lies_on_surfaces(lo, hi, ends, node)
+    if not shallow and _has_no_substitute(lo, hi, a, b, ends, node):
+        return math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2), NO_SUBSTITUTE, 0, 0
     # the path between the nearest points; leaves_a, leaves_b: it does not touch the surface at F
     moved = (gx, gy, gz, px, py, pz, qx, qy, qz)
-    status, best, error, iterations, evaluations = solve_active_set(lo, hi, moved, node, tol, direct)
+    # surfaces between an end and the one that contains it, to which the path from F would have to come back
+    before, after = lo, hi
+    if not shallow:
+        before, after = max(a, lo), surface_end(b, hi, node) if b >= 0 else hi
+    if before >= after or _holds_an_end(lo, before, after, hi, moved, node):
+        return math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2), NO_SUBSTITUTE, 0, 0
+    _lift_all(lo, before, node)
+    _lift_all(after, hi, node)
+    status, best, error, iterations, evaluations = solve_active_set(before, after, moved, node, tol, direct)
     behind = surface_end(a, hi, node) if a >= 0 else lo
     k, j = _first_and_last_contact(lo, hi, node)
     leaves_a, leaves_b = a >= 0 and not a <= k < behind, b >= 0 and j < b
-    # with both ends inside one surface a search may find another wrap from these nearest points than from the last ones
-    good = a < 0 or a != b or closed_form(a, node)
-    good = good and (not leaves_a or a == lo)  # only the surface next to an end can be ignored
+    good = not leaves_a or a == lo  # only the surface next to an end can be ignored
     good = good and (not leaves_b or surface_end(b, hi, node) == hi)
     # a path that leaves F and touches the same surface again, behind a hollow, is not covered
     good = good and (a < 0 or leaves_a or node[k, lay.W_L] <= ON_SURFACE * node[k, lay.SIZE])
     good = good and (b < 0 or leaves_b or node[j, lay.W_LQ] <= ON_SURFACE * node[j, lay.SIZE])
-    # the path of an end that lies on the surface needs no more than to be found
-    shallow = lies_on_surfaces(lo, hi, ends, node)
     if status != lay.CONVERGED or not (good or shallow):
         return best, NO_SUBSTITUTE, iterations, evaluations
     save_solutions(lo, hi, node, lay.W_START)
@@ -173,7 +194,7 @@ def substitute_path(lo, hi, ends, node, tol, direct):
             continue
         if a == b and choice < 3:
             continue
-        first, last = behind if over_a else lo, b if over_b else hi
+        first, last = behind if over_a else before, b if over_b else after
         last = max(first, last)
         sx, sy, sz, tx, ty, tz = px, py, pz, qx, qy, qz
         if over_a:

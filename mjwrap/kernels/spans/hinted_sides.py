@@ -22,8 +22,8 @@ from mjwrap.kernels.spans.cold_start import next_contact_point
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.tangency.tangency_error import evaluate
+from mjwrap.kernels.wraps.hinted_half import hint_is_behind, hint_outside
 from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, hint_is_level, is_on_side
-from mjwrap.kernels.wraps.search import hint_is_behind, hint_outside
 from mjwrap.kernels.wraps.sides import contact_in_frame, middle_of_contact, on_allowed_half
 from mjwrap.kernels.wraps.single import sweep_asked_for, wrap
 

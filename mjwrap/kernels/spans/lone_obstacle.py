@@ -7,10 +7,10 @@ import math
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.geometry.traits import sided
-from mjwrap.kernels.spans.active_set_method import ends_in_short_segment
 from mjwrap.kernels.spans.cold_start import path_length
 from mjwrap.kernels.spans.lift_off_touchdown import follow_branch, in_range
 from mjwrap.kernels.spans.saved_solutions import save_solutions
+from mjwrap.kernels.spans.span_ends import ends_in_short_segment
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.tangency_error import connect_segments
 from mjwrap.kernels.wraps.single import wrap

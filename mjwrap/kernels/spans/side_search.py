@@ -27,6 +27,7 @@ from mjwrap.kernels.spans.lift_off_touchdown import (
     touchdown,
 )
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions
+from mjwrap.kernels.spans.span_ends import lies_on_surfaces
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
 
@@ -52,7 +53,9 @@ GROUP_STEP = 3  # number of obstacles from the start of one group to the start o
 GROUP_NEIGHBOURS = 2  # obstacles on each side of a group that are wrapped again, too
 PATTERNS = 12  # number of random patterns of hints where the row is a single group
 PATTERNS_PER_GROUP = 8  # number of random patterns for each group of a longer row
-EXTRA_PATTERNS = 4  # factor on these numbers while there is no path, or none in range
+EXTRA_PATTERNS = (
+    4  # factor on these numbers while there is no path, or none in range, and no end inside a surface
+)
 UNTOUCHED_CHANCE = 0.25  # probability that a pattern leaves an obstacle untouched
 
 
@@ -241,6 +244,9 @@ def try_random_hints(lo, hi, ends, node, sound):
     The neighbours of the group are wrapped again, too. sound: the present path is certified.
     """
     spent = 0
+    # an end inside a surface explains why there is no path
+    if not sound and not lies_on_surfaces(lo, hi, ends, node):
+        return spent
     changed = False
     first_group = True
     k, end = lo, lo

@@ -21,12 +21,13 @@ from mjwrap.kernels.geometry.traits import branched, closed_form, sided
 from mjwrap.kernels.geometry.winding import TWO_PI, nearest_turn
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
-from mjwrap.kernels.spans.end_inside import lies_on_surfaces, substitute_path
+from mjwrap.kernels.spans.end_inside import substitute_path
 from mjwrap.kernels.spans.hinted_sides import meet_hints
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.spans.sided_start import start_from_sides
+from mjwrap.kernels.spans.span_ends import lies_on_surfaces
 from mjwrap.kernels.wraps.sides import any_sided, forget
 
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT

@@ -17,14 +17,12 @@ from numba.core import types
 from mjwrap.kernels import layout as lay
 from mjwrap.kernels.compilation.jit import deferred, jit
 from mjwrap.kernels.geometry.dispatch import (
-    height,
     project,
     segment_clearance,
     segment_winding_angle,
     winding_angle,
 )
 from mjwrap.kernels.geometry.geodesics import geodesic
-from mjwrap.kernels.geometry.projection import turn_into_frame
 from mjwrap.kernels.geometry.stoermer import carray, stack
 from mjwrap.kernels.geometry.traits import branched, ellipse_sections, hollow, one_sided, sided
 from mjwrap.kernels.geometry.winding import unwrap_angle
@@ -38,6 +36,7 @@ from mjwrap.kernels.wraps.end_on_surface import (
     shoot_geodesics,
 )
 from mjwrap.kernels.wraps.ends_from_above import search_from_above
+from mjwrap.kernels.wraps.hinted_half import hint_outside, is_there, straight_is_refused
 from mjwrap.kernels.wraps.initial_guess import (
     guess_in_half_plane,
     height_of_section,
@@ -47,11 +46,10 @@ from mjwrap.kernels.wraps.initial_guess import (
 )
 from mjwrap.kernels.wraps.ring import NO_SIDE, asked_side, is_on_side, wrap_on_side
 from mjwrap.kernels.wraps.ruled import A_INSIDE, B_INSIDE, INSIDE, set_free
-from mjwrap.kernels.wraps.sides import is_hopeless, middle_of_contact, on_allowed_half, point_of_side
+from mjwrap.kernels.wraps.sides import is_hopeless, point_of_side
 
 SIZE, HINT = lay.SIZE, lay.HINT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
-W_P, W_Q = lay.W_P, lay.W_Q
 COLD, TOUCHED = lay.COLD, lay.TOUCHED
 
 NEAR_HINT = 5  # half planes within 60 degrees of the hint
@@ -142,7 +140,7 @@ def wrap_by_search(k, ends, node, search):
             hinted
             and not hollow(k, node)
             and not one_sided(k, node)
-            and _straight_is_refused(k, node, held, share, ax, ay, az, dx, dy, dz)
+            and straight_is_refused(k, node, held, share, ax, ay, az, dx, dy, dz)
             and _search(
                 k, ends, node, ax, ay, az, dx, dy, dz, size, share, True, True, branch, before, False,
                 high_a, high_b, NEAR_HINT,
@@ -162,67 +160,6 @@ def wrap_by_search(k, ends, node, search):
         high_a, high_b, DIRECTIONS,
     )  # fmt: skip
     return inside
-
-
-@jit
-def _is_towards(k, node, fx, fy, fz, wx, wy, wz):
-    """Return whether the contact of the last evaluation lies in the direction w from the point F, in S."""
-    x, y, z = (
-        node[k, W_Q] - node[k, W_P],
-        node[k, W_Q + 1] - node[k, W_P + 1],
-        node[k, W_Q + 2] - node[k, W_P + 2],
-    )
-    x, y, z = turn_into_frame(node, k, x, y, z)
-    # half way from P to Q
-    x, y, z = node[k, S_P] + 0.5 * x - fx, node[k, S_P + 1] + 0.5 * y - fy, node[k, S_P + 2] + 0.5 * z - fz
-    return x * wx + y * wy + z * wz >= 0.0
-
-
-@jit
-def _is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz):
-    """Return whether the contact of the last evaluation lies where row k's hint asks.
-
-    held: on the half that a side allows at every pose, else in the direction w from the point F, in S.
-    """
-    if held:
-        x, y, z = middle_of_contact(k, ends, node)
-        return on_allowed_half(k, node, x, y, z)
-    return hollow(k, node) or _is_towards(k, node, fx, fy, fz, wx, wy, wz)
-
-
-@jit
-def hint_outside(k, node):
-    """Return row k's hint, or the surface point nearest to it where it lies inside the surface."""
-    x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
-    if height(node, k, x, y, z) < 0.0:
-        x, y, z, _, _, _ = project(node, k, x, y, z)
-    return x, y, z
-
-
-@jit
-def hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz):
-    """Return whether the hint lies behind row k's surface, seen from the lowest point F of the segment A + share d.
-
-    It is beyond the tangent plane of the surface at the point nearest to F, and the surface between F and the hint.
-    """
-    x, y, z = node[k, HINT + 1], node[k, HINT + 2], node[k, HINT + 3]
-    fx, fy, fz = ax + share * dx, ay + share * dy, az + share * dz
-    px, py, pz, nx, ny, nz = project(node, k, fx, fy, fz)
-    if nx * (x - px) + ny * (y - py) + nz * (z - pz) >= 0.0:
-        return False
-    _, _, _, nx, ny, nz = project(node, k, x, y, z)
-    return nx * (x - fx) + ny * (y - fy) + nz * (z - fz) > 0.0
-
-
-@jit
-def _straight_is_refused(k, node, held, share, ax, ay, az, dx, dy, dz):
-    """Return whether the straight segment A + d, which is clear, passes row k's surface where its hint does not ask.
-
-    held: the hint is a side that holds at every pose. share: of the segment's lowest point.
-    """
-    if held:
-        return not on_allowed_half(k, node, ax + share * dx, ay + share * dy, az + share * dz)
-    return hint_is_behind(k, node, share, ax, ay, az, dx, dy, dz)
 
 
 @jit
@@ -305,7 +242,7 @@ def _search(
         if not good or not _on_branch(k, node, branch, before):
             continue
         # one on the hint's side is better than one that is not, then the shorter one
-        there = not hinted or _is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz)
+        there = not hinted or is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz)
         if (
             found
             and (sided_path or not there)
@@ -329,7 +266,7 @@ def _search(
                 good, total = polish_shot(k, ends, node, side, high_a, high_b, ways[2 * i], ways[2 * i + 1])
                 if not good or not _on_branch(k, node, branch, before):
                     continue
-                there = held and _is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz)
+                there = held and is_there(k, ends, node, held, fx, fy, fz, wx, wy, wz)
                 if found and (
                     (sided_path and not there) or (sided_path == there and total >= best * (1.0 - 1e-12))
                 ):

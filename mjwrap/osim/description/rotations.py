@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,11 +12,19 @@ Array = NDArray[np.float64]
 
 def about(axis: ArrayLike, angle: float) -> Array:
     """Return the matrix (3, 3) of a turn by an angle about an axis (3,), which need not have length 1."""
-    axis = np.asarray(axis, dtype=np.float64)
-    x, y, z = axis / np.linalg.norm(axis)
-    c, s = np.cos(angle), np.sin(angle)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return c * np.eye(3) + s * cross + (1.0 - c) * np.outer((x, y, z), (x, y, z))
+    x, y, z = (float(component) for component in np.asarray(axis, dtype=np.float64))
+    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    c, s = math.cos(angle), math.sin(angle)
+    d = 1.0 - c
+    # entry by entry: an import evaluates it some ten thousand times
+    return np.array(
+        [
+            [c + d * x * x, d * x * y - s * z, d * x * z + s * y],
+            [d * x * y + s * z, c + d * y * y, d * y * z - s * x],
+            [d * x * z - s * y, d * y * z + s * x, c + d * z * z],
+        ]
+    )
 
 
 def body_fixed_xyz(angles: ArrayLike) -> Array:
