@@ -61,7 +61,7 @@ def test_conditional_points_belong_at_both_ends_of_their_range():
     path = next(force.path for force in model.forces if isinstance(force, Muscle) and force.name == "m1")
     condition = path.points[1].condition
     assert condition is not None
-    low, high = condition.range
+    low, high = condition.range[0] - 1e-5, condition.range[1] + 1e-5  # OpenSim 4.6 has this tolerance
     counts = []
     for angle in (np.nextafter(low, -9.0), low, high, np.nextafter(high, 9.0)):
         values = complete(model, {"a1": angle})

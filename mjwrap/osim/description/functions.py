@@ -63,3 +63,17 @@ def constant(value: float) -> Piecewise:
 def linear(slope: float, at_zero: float = 0.0) -> Piecewise:
     """Return the straight line at_zero + slope x."""
     return Piecewise(np.zeros(0), np.zeros(1), np.array([[float(at_zero), float(slope)]]), "LinearFunction")
+
+
+def clamped(function: Piecewise, low: float, high: float) -> Piecewise:
+    """Return the function of x limited to [low, high]: constant, with the values there, beyond both ends."""
+    if not low < high or function.is_constant:
+        return function
+    inside = function.breaks[(function.breaks > low) & (function.breaks < high)]
+    chosen = function.piece(np.concatenate([[low], inside]))
+    rows = np.zeros((len(chosen) + 2, function.coefficients.shape[1]))
+    rows[1:-1] = function.coefficients[chosen]
+    rows[[0, -1], 0] = function(low), function(high)
+    breaks = np.concatenate([[low], inside, [high]])
+    origins = np.concatenate([[low], function.origins[chosen], [high]])
+    return Piecewise(breaks, origins, rows, function.kind, function.error)

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from mjwrap.osim.description.bodies import Frame
 from mjwrap.osim.description.functions import Piecewise
 
+RANGE_TOLERANCE = (
+    1e-5  # [rad or m] by which a conditional point's range is wider in OpenSim 4.6, at both ends
+)
+
 
 @dataclass(frozen=True)
 class WrapObject:
@@ -24,15 +28,23 @@ class WrapObject:
 
 @dataclass(frozen=True)
 class Condition:
-    """A coordinate and the range [rad or m] in which a conditional point belongs to the path; both ends included."""
+    """A coordinate and the range [rad or m] in which a conditional point belongs to the path, as in the file."""
 
     coordinate: str
     range: tuple[float, float]
 
+    @property
+    def held(self) -> tuple[float, float]:
+        """The range in which the point belongs to the path in OpenSim, both ends included."""
+        return self.range[0] - RANGE_TOLERANCE, self.range[1] + RANGE_TOLERANCE
+
 
 @dataclass(frozen=True)
 class MovingLocation:
-    """x, y and z of a moving point as functions of one coordinate each; no name where the function is constant."""
+    """x, y and z of a moving point as functions of one coordinate each; no name where the function is constant.
+
+    As in OpenSim, the functions are constant outside the ranges of their coordinates.
+    """
 
     coordinates: tuple[str, str, str]
     functions: tuple[Piecewise, Piecewise, Piecewise]

@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 
 
 def holds(condition: Condition | None, values: Mapping[str, float]) -> bool:
-    """Return whether a conditional point belongs to its path; both ends of its range are included."""
+    """Return whether a conditional point belongs to its path."""
     if condition is None:
         return True
-    low, high = condition.range
+    low, high = condition.held
     return low <= values[condition.coordinate] <= high
 
 

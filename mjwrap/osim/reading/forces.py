@@ -53,7 +53,7 @@ def read_force(node: Node, name: str, known: Known) -> Force:
         if element.tag != "GeometryPath":
             node.note(f"its path is a {element.tag}, which cannot be read")
             return OtherForce(name, node.tag)
-        path = read_path(element, known.places, known.coordinate, known.wraps)
+        path = read_path(element, known.places, known.coordinate, known.wraps, known.coordinates)
         if is_muscle(node):
             return read_muscle(node, name, path, active)
         return _ALONG_PATHS[node.tag](node, name, path, active)

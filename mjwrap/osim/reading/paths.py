@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from mjwrap.osim.description.functions import constant
+from mjwrap.osim.description.bodies import Coordinate
+from mjwrap.osim.description.functions import clamped, constant
 from mjwrap.osim.description.paths import Condition, MovingLocation, Path, PathPoint, PathWrap, WrapObject
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading.frames import FRAMES, Places, offset, socket
@@ -72,9 +73,15 @@ def path_node(force: Node) -> Node | None:
     return found
 
 
-def read_path(node: Node, places: Places, coordinate: CoordinateName, wraps: dict[str, str]) -> Path:
+def read_path(
+    node: Node,
+    places: Places,
+    coordinate: CoordinateName,
+    wraps: dict[str, str],
+    coordinates: Mapping[str, Coordinate],
+) -> Path:
     """Return a path; `wraps` has the names of wrap objects as they are kept, by their names in the file."""
-    points = [_point(point, places, coordinate) for point in node.objects("PathPointSet")]
+    points = [_point(point, places, coordinate, coordinates) for point in node.objects("PathPointSet")]
     if len(points) < 2:
         raise node.error(f"has {len(points)} points; a path needs two")
     for which, point in (("first", points[0]), ("last", points[-1])):
@@ -87,7 +94,9 @@ def read_path(node: Node, places: Places, coordinate: CoordinateName, wraps: dic
     )
 
 
-def _point(node: Node, places: Places, coordinate: CoordinateName) -> PathPoint:
+def _point(
+    node: Node, places: Places, coordinate: CoordinateName, coordinates: Mapping[str, Coordinate]
+) -> PathPoint:
     if node.tag in ("PathPoint", "MusclePoint"):
         return PathPoint(node.name, places.point(node))
     if node.tag in ("ConditionalPathPoint", "MuscleViaPoint"):
@@ -100,12 +109,13 @@ def _point(node: Node, places: Places, coordinate: CoordinateName) -> PathPoint:
         names, functions = [], []
         for i, axis in enumerate("xyz"):
             function = read_property(node, f"{axis}_location", default=location[i])
-            names.append(
-                ""
-                if function.is_constant
-                else coordinate(node, socket(node, f"{axis}_coordinate", f"{axis}_coordinate"))
-            )
-            functions.append(constant(function(0.0).item()) if function.is_constant else function)
+            if function.is_constant:
+                names.append("")
+                functions.append(constant(function(0.0).item()))
+                continue
+            names.append(coordinate(node, socket(node, f"{axis}_coordinate", f"{axis}_coordinate")))
+            # OpenSim puts the point where it is at the nearest value in the coordinate's range, clamped or not.
+            functions.append(clamped(function, *coordinates[names[-1]].range))
         moving = MovingLocation((names[0], names[1], names[2]), (functions[0], functions[1], functions[2]))
         return PathPoint(node.name, frame, moving=moving)
     raise node.error(

@@ -116,8 +116,9 @@ class SiteWriter:
 
     def _condition(self, owner: str, site: str, condition: Condition) -> Elements:
         driver = self._drivers(condition.coordinate)
-        low, high = condition.range
+        low, high = condition.held
         held = (low, high) if driver is None or driver[1] is None else preimage(driver[1], low, high)
+        low, high = condition.range
         if driver is None or held is None:
             inside = low <= self._defaults.get(condition.coordinate, 0.0) <= high
             self._report.add("ConditionalPathPoint", site, APPROXIMATED,
