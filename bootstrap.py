@@ -32,7 +32,12 @@ DEMO_PLOT = "out/elbow.png"
 FOLDERS = {3: ".venv", 4: ".venv-mujoco4"}
 DEMO_EXTRAS = {"demo", "myo"}
 TEST_EXTRAS = {3: {"demo", "dev", "myo", "test"}, 4: {"demo", "test"}}
-ON_ALL_CORES = ("-n", "auto", "--dist", "loadfile")  # whole files, because the tests of one share what they make
+ON_ALL_CORES = (
+    "-n",
+    "auto",
+    "--dist",
+    "loadfile",
+)  # whole files, because the tests of one share what they make
 PINS = {3: "mujoco<4", 4: "mujoco>=4"}
 
 
