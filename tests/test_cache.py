@@ -29,8 +29,8 @@ print(json.dumps({"numbers": sweep.length.tolist(), "folder": str(cache_folders.
 PULL = """
 import json, numpy as np
 from mjwrap.kernels.compilation import cache_folders
-from mjwrap.kernels.musculotendon import fiber
-print(json.dumps({"numbers": [fiber.velocity_curve(2, 0.3)[0]], "folder": str(cache_folders.base())}))
+from mjwrap.kernels.musculotendon import dispatch
+print(json.dumps({"numbers": [dispatch.velocity_curve(2, 0.3)[0]], "folder": str(cache_folders.base())}))
 """
 
 
@@ -215,8 +215,8 @@ import json
 from mjwrap.kernels.compilation import self_test
 self_test.TESTED = ()
 from mjwrap.kernels.compilation import cache_folders
-from mjwrap.kernels.musculotendon import fiber
-numbers = [fiber.velocity_curve(2, 0.3)[0], self_test.is_plain()]
+from mjwrap.kernels.musculotendon import dispatch
+numbers = [dispatch.velocity_curve(2, 0.3)[0], self_test.is_plain()]
 print(json.dumps({"numbers": numbers, "folder": str(cache_folders.base())}))
 """
 

@@ -276,7 +276,8 @@ def test_elements_of_other_types(kind: str, name: str) -> None:
     custom = '<tuple name="others"><element objtype="site" objname="via"/></tuple>' + custom
     text = message(compiled(custom=custom))
     assert (
-        f"tuple 'mjwrap_m': {kind} '{name}' cannot be used; use actuator, tendon, site, geom, numeric" in text
+        f"tuple 'mjwrap_m': {kind} '{name}' cannot be used; use actuator, tendon, site, geom, joint, numeric"
+        in text
     )
 
 

@@ -204,7 +204,7 @@ def test_sizes_at_the_limits() -> None:
     law = mw.DeGrooteFregly2016(
         max_isometric_force=500.0, optimal_fiber_length=0.1, tendon_slack_length=0.0, fiber_damping=0.0
     )
-    assert law.row() == (500.0, 0.1, 0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.1 * 0.2)
+    assert law.row() == (500.0, 0.1, 0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.1 * 0.2, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("law", [mw.DeGrooteFregly2016, mw.Millard2012])

@@ -19,6 +19,7 @@ from mjwrap.runs import load
 PRM = (0.75, 1.05, 100.0, 0.0, 0.5, 1.6, 1.5, 1.3, 1.2)
 SHAPES = ("capsule", "cone", "cylinder", "ellipsoid", "elliptic_cylinder", "sphere", "torus")
 TIME = np.linspace(0.0, 0.1, 5)
+CURVE = (1, 0.0, 0.0, 1.0)  # one straight piece
 BALL = mw.Obstacle(mw.Sphere(0.03))
 ENDS = ((0.1, 0.0, 0.0), (-0.1, 0.02, 0.03))
 LAW = mw.DeGrooteFregly2016(100.0, 0.1, 0.1)
@@ -100,15 +101,18 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "DeGrooteFregly2016": (100.0, 0.1, 0.1),
         "Ellipsoid": ((0.1, 0.2, 0.3),),
         "EllipticCylinder": ((0.1, 0.2),),
+        "Ligament": (100.0, 0.1, CURVE),
         "Millard2012": (100.0, 0.1, 0.1),
         "MuJoCoMuscle": (PRM, (0.1, 0.2), 1.0),
         "MuscleSystem": (model,),
         "Obstacle": (mw.Sphere(0.03),),
         "ParameterLimits": (),
         "PathActuator": (1.0,),
+        "PathSpring": (100.0, 0.1),
         "Recorder": (model, muscles, folder / "r.rrd"),
         "Sphere": (0.1,),
         "Table": (np.arange(3.0), ("a",), np.zeros((3, 1))),
+        "Thelen2003": (100.0, 0.1, 0.1),
         "Torus": (0.1, 0.05),
         "Umberger2010": (),
         "ViaPoint": ((0.0, 0.0, 0.0),),
@@ -118,6 +122,7 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "fit_fiber_and_slack": (0.2, 0.3),
         "hill_from_mujoco": (mw.MuJoCoMuscle(PRM, (0.1, 0.2), 1.0),),
         "implausible": (muscles,),
+        "import_osim": ("mjwrap:leg",),
         "insert_xml": ("<mujoco></mujoco>", "<custom/>"),
         "length_ranges": (muscles,),
         "load": (ELBOW,),
@@ -207,7 +212,7 @@ def wrong(
 EXPENSIVE = {"ImplicitSurface", "ParametricSurface", "implausible", "length_ranges", "set_length_ranges"}
 EXPENSIVE |= {f"fit_{shape}" for shape in SHAPES}
 RESULTS = {  # that functions return; nobody makes them
-    "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "JointCurves", "LengthRange",
+    "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "Imported", "JointCurves", "LengthRange",
     "MuscleTrial", "ParameterReport", "PathSolution", "Status", "SweepSolution",
 }  # fmt: skip
 

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
+import numpy as np
 
+from mjwrap.errors import OsimError
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathSpring
@@ -90,9 +92,15 @@ def import_osim(
     folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]
     skeleton = write_mechanics(document, model, report, folders)
     write_paths(document, model, report, skeleton, poses)
+    compiled = document.compile()
+    data = mujoco.MjData(compiled)
+    mujoco.mj_forward(compiled, data)
+    if not all(np.isfinite(values).all() for values in (data.qpos, data.xpos, data.qacc)):
+        raise OsimError(
+            f"'{path}': the model's accelerations at the default pose are not finite; its numbers are too large"
+        )
     xml = document.to_xml()
-    spec = mujoco.MjSpec.from_string(xml, assets=document.assets)
-    return Imported(spec, report, xml, document.assets)
+    return Imported(mujoco.MjSpec.from_string(xml, assets=document.assets), report, xml, document.assets)
 
 
 def write_paths(document: Document, model: OsimModel, report: Report, skeleton: Skeleton, poses: int) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from xml.etree import ElementTree
 
 import mujoco
+import numpy as np
 
 from mjwrap.errors import OsimError
 
@@ -17,11 +19,13 @@ def text_of(value: object) -> str:
     """Return an attribute's text: numbers so that reading them gives the same bits, sequences with spaces."""
     if isinstance(value, str):
         return value
-    if isinstance(value, bool):
+    if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if isinstance(value, Iterable):
         return " ".join(text_of(item) for item in value)
     number = float(value)  # type: ignore[arg-type]
+    if abs(number) < sys.float_info.min:  # MuJoCo's reader refuses numbers that are not normal
+        return "0"
     return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
 
 
