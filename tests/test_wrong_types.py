@@ -212,8 +212,8 @@ def wrong(
 EXPENSIVE = {"ImplicitSurface", "ParametricSurface", "implausible", "length_ranges", "set_length_ranges"}
 EXPENSIVE |= {f"fit_{shape}" for shape in SHAPES}
 RESULTS = {  # that functions return; nobody makes them
-    "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "Imported", "JointCurves", "LengthRange",
-    "MuscleTrial", "ParameterReport", "PathSolution", "Status", "SweepSolution",
+    "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "Imported", "JointCurves",
+    "LengthRange", "MuscleTrial", "ParameterReport", "PathSolution", "Status", "SweepSolution",
 }  # fmt: skip
 
 

@@ -187,6 +187,8 @@ class Thelen2003(FiberLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        for key in ("fiber_damping", "minimum_activation"):  # other laws take None for their own default
+            validation.not_negative(getattr(self, key), f"{self.law}: {key}", ModelError)
         positive(self, **{key: getattr(self, key) for key in self.takes[len(FiberLaw.takes) :]})
         most, name = self.max_lengthening_force, f"{self.law}: max_lengthening_force"
         validation.between(most, math.nextafter(1.0, 2.0), math.inf, name, ModelError, "above 1")

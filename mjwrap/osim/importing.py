@@ -10,6 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from mjwrap import validation
 from mjwrap.errors import OsimError
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf.named_models import osim_file
@@ -85,7 +86,17 @@ def import_osim(
 
     Raises:
         OsimError: the file is not an OpenSim model, or has an element that cannot be represented; the message names it.
+            An argument has a wrong type.
     """
+    validation.require(
+        isinstance(path, str | os.PathLike), "path", "the name of an .osim file", path, OsimError
+    )
+    single = isinstance(meshes, str | os.PathLike)
+    good = (
+        not single and isinstance(meshes, Sequence) and all(isinstance(m, str | os.PathLike) for m in meshes)
+    )
+    validation.require(good, "meshes", "a list of folders", meshes, OsimError)
+    validation.whole(poses, 1, "poses", OsimError)
     path = osim_file(path)
     model = read_osim(path)
     document, report = Document(model.name), Report(model.name, model.version)
@@ -97,7 +108,7 @@ def import_osim(
     mujoco.mj_forward(compiled, data)
     if not all(np.isfinite(values).all() for values in (data.qpos, data.xpos, data.qacc)):
         raise OsimError(
-            f"'{path}': the model's accelerations at the default pose are not finite; its numbers are too large"
+            f"'{path}': accelerations at the default pose are not finite; some number is too large"
         )
     xml = document.to_xml()
     return Imported(mujoco.MjSpec.from_string(xml, assets=document.assets), report, xml, document.assets)
