@@ -20,7 +20,7 @@ CASES = [name for name in NAMES if name != "knee_patella_ligament"]  # it has no
 def differences(name: str, wrapped: bool) -> list[tuple[float, str]]:
     """Return the differences of mjwrap's lengths from OpenSim's [m], with the names of the paths."""
     frozen = json.loads((FROZEN / f"lengths_{name}.json").read_text())
-    model = compiled(name) if model_file(name) else None
+    model = compiled(name)
     data, muscles = mujoco.MjData(model), mw.MuscleSystem(model)
     found = []
     for values, lengths in zip(frozen["values"], frozen["lengths"], strict=True):

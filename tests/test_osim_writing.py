@@ -59,7 +59,13 @@ def turning(name: str, parent: Frame, child: Frame, function: Piecewise | None =
         Axis(np.array([0.0, 1.0, 0.0]), (), constant(0.0)),
     )
     return Joint(
-        name, "CustomJoint", parent, child, (coordinate(name, **options),), (turn, *rest), tuple(still)
+        name,
+        "CustomJoint",
+        parent,
+        child,
+        (coordinate(name, **options),),
+        (turn, *rest),
+        (still[0], still[1], still[2]),
     )
 
 
@@ -133,6 +139,7 @@ def test_the_nearest_physical_inertia_is_written():
         odd = Body("b", 1.0, np.zeros(3), turn @ np.diag(given) @ turn.T)
         branches = branches_of(model([odd], [turning("j", ORIGIN, frame("b"))]))
         now = written_inertias((odd,), branches)["b"]
+        assert now.properties is not None
         moments = now.properties.principal()[0]
         assert moments[0] + moments[1] >= moments[2]
         missing = given[2] - given[0] - given[1]
@@ -153,7 +160,8 @@ def test_joined_mass_properties_are_those_of_both_bodies():
     def properties(points, masses):
         center = masses @ points / masses.sum()
         away = points - center
-        inertia = sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, away, strict=True))
+        parts = [m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, away, strict=True)]
+        inertia = np.sum(parts, axis=0)
         return MassProperties(masses.sum(), center, inertia)
 
     joined = properties(points[0], masses[0]).joined(properties(points[1], masses[1]))
@@ -190,8 +198,11 @@ def test_a_dependent_coordinate_without_an_axis_is_composed_through_its_coupler(
     found = written(osim)
     compiled = found.compile()
     assert [compiled.joint(k).name for k in range(compiled.njnt)] == ["j0", "j1_rotation1"]
-    joint, function = found.skeleton.drivers.driver("j1")
+    driver = found.skeleton.drivers.driver("j1")
+    assert driver is not None
+    joint, function = driver
     assert joint == "j0"
+    assert function is not None
     for x in np.linspace(-2.0, 2.0, 41):
         assert function(x) == pytest.approx(1.5 * float(coupler.function(x)), abs=1e-14)
     data = mujoco.MjData(compiled)

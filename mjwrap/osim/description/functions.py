@@ -66,7 +66,10 @@ def linear(slope: float, at_zero: float = 0.0) -> Piecewise:
 
 
 def clamped(function: Piecewise, low: float, high: float) -> Piecewise:
-    """Return the function of x limited to [low, high]: constant, with the values there, beyond both ends."""
+    """Return the function of x limited to [low, high]: constant, with the values there, beyond both ends.
+
+    At both ends themselves it has the slope from inside, so that a sweep over the whole range has no kink.
+    """
     if not low < high or function.is_constant:
         return function
     inside = function.breaks[(function.breaks > low) & (function.breaks < high)]
@@ -74,6 +77,6 @@ def clamped(function: Piecewise, low: float, high: float) -> Piecewise:
     rows = np.zeros((len(chosen) + 2, function.coefficients.shape[1]))
     rows[1:-1] = function.coefficients[chosen]
     rows[[0, -1], 0] = function(low), function(high)
-    breaks = np.concatenate([[low], inside, [high]])
+    breaks = np.concatenate([[low], inside, [np.nextafter(high, np.inf)]])
     origins = np.concatenate([[low], function.origins[chosen], [high]])
     return Piecewise(breaks, origins, rows, function.kind, function.error)
