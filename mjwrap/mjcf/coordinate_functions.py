@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import name_of
+from mjwrap.mjcf.piecewise_numerics import read_pieces
 from mjwrap.mjcf.tuple_names import COORDINATE
 
 OBJ = mujoco.mjtObj
-_FORM = "P, then P-1 breaks, P origins and P rows of coefficients, the constant first"
 
 
 class CoordinateFunction(NamedTuple):
@@ -68,14 +68,6 @@ def read_coordinate_functions(model: mujoco.MjModel) -> dict[str, CoordinateFunc
 
 
 def _polynomials(model: mujoco.MjModel, numeric: int) -> tuple[NDArray[np.float64], list[Polynomial]]:
-    first, size = int(model.numeric_adr[numeric]), int(model.numeric_size[numeric])
-    data = model.numeric_data[first : first + size].copy()
-    pieces = int(data[0]) if np.isfinite(data).all() and data[0] >= 1.0 else 0
-    count = size - 2 * pieces
-    if not pieces or count < pieces or count % pieces or (np.diff(data[1:pieces]) <= 0.0).any():
-        name = name_of(model, OBJ.mjOBJ_NUMERIC, numeric)
-        raise ModelError(f"numeric '{name}' is not a piecewise polynomial: {_FORM}")
-    rows = data[2 * pieces :].reshape(pieces, -1)
-    origins = data[pieces : 2 * pieces]
+    breaks, origins, rows = read_pieces(model, numeric)
     shifted = [Polynomial(row)(Polynomial([-at, 1.0])) for row, at in zip(rows, origins, strict=True)]
-    return data[1:pieces], shifted
+    return breaks, shifted

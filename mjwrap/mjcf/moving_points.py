@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.names import name_of
+from mjwrap.mjcf.piecewise_numerics import read_pieces
 from mjwrap.mjcf.tuple_names import MOVING
 
 Array = NDArray[np.float64]
 OBJ = mujoco.mjtObj
 SCALAR = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-_FORM = "P, then P-1 breaks, P origins and P rows of coefficients, the constant first"
 
 
 class MovingAxis(NamedTuple):
@@ -94,7 +94,7 @@ def _read_tuple(model: mujoco.MjModel, index: int) -> list[MovingAxis]:
             )
         if int(prm) in axes:
             raise ModelError(f"axis {'xyz'[int(prm)]} is given twice, the second time with joint '{called}'")
-        axes[int(prm)] = MovingAxis(items[0], int(prm), joint, *_read_pieces(model, numeric))
+        axes[int(prm)] = MovingAxis(items[0], int(prm), joint, *read_pieces(model, numeric))
     return list(axes.values())
 
 
@@ -110,19 +110,3 @@ def check_scalar(model: mujoco.MjModel, joint: int, what: str) -> None:
     if int(model.jnt_type[joint]) not in SCALAR:
         name = name_of(model, OBJ.mjOBJ_JOINT, joint)
         raise ModelError(f"joint '{name}' {what}, so it must be a hinge or a slide")
-
-
-def _read_pieces(model: mujoco.MjModel, numeric: int) -> tuple[Array, Array, Array]:
-    """Return breaks, origins and coefficients of a numeric."""
-    first, name = int(model.numeric_adr[numeric]), name_of(model, OBJ.mjOBJ_NUMERIC, numeric)
-    data = np.array(model.numeric_data[first : first + int(model.numeric_size[numeric])])
-    if not np.isfinite(data).all():
-        raise ModelError(f"numeric '{name}' must be finite")
-    pieces = int(data[0]) if len(data) and data[0] == np.floor(data[0]) and 1.0 <= data[0] <= len(data) else 0
-    rest = len(data) - 2 * pieces
-    if not pieces or rest < pieces or rest % pieces:
-        raise ModelError(f"numeric '{name}' has {len(data)} numbers, which are not {_FORM}")
-    breaks, origins = data[1:pieces], data[pieces : 2 * pieces]
-    if (np.diff(breaks) <= 0.0).any():
-        raise ModelError(f"numeric '{name}': its breaks must ascend, not be {breaks.tolist()}")
-    return breaks, origins, data[2 * pieces :].reshape(pieces, -1)

@@ -9,14 +9,13 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Sequence
-from importlib import resources
 from typing import Any
 
-import jinja2
 import matplotlib.pyplot as plt
 import mujoco
 
 import mjwrap
+from mjwrap.cli.common.pages import report_template
 from mjwrap.cli.compare.plot import COLOURS, draw_motion, draw_sweep
 from mjwrap.cli.compare.text import TITLES, millimetres, starred, unlike_routes, where
 from mjwrap.comparison import (
@@ -53,7 +52,7 @@ def write_page(
     tables: Sequence[TableDifference] = (),
 ) -> None:
     """Write the page; command: the command line that makes it again."""
-    page = _template().render(
+    page = report_template("mjwrap.cli.compare").render(
         model=model,
         command=command,
         versions=f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__} (side rule {found.side_rule})",
@@ -71,18 +70,6 @@ def write_page(
         counted=counted,
     )
     output.write_text(page)
-
-
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    source = resources.files("mjwrap.cli.compare") / "report.html.j2"
-    return environment.from_string(source.read_text(encoding="utf-8"))
 
 
 def _facts(found: PoseComparison) -> list[dict[str, object]]:

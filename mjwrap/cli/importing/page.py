@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from importlib import resources
 
-import jinja2
 import mujoco
 
 import mjwrap
+from mjwrap.cli.common.pages import report_template
 from mjwrap.files.atomic import PartFile
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Entry, Report
 from mjwrap.osim.verifying.differences import UNEXPLAINED, Verification
@@ -22,7 +21,7 @@ def write_page(
     """Write the page; command: the command line that makes it again."""
     counts = report.counted()
     kinds = list(dict.fromkeys(kind for kind, _ in counts))
-    page = _template().render(
+    page = report_template("mjwrap.cli.importing").render(
         model=model,
         command=command,
         versions=f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__}",
@@ -34,18 +33,6 @@ def write_page(
         verification=_verification(found) if found is not None else None,
     )  # fmt: skip
     output.write_text(page)
-
-
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    source = resources.files("mjwrap.cli.importing") / "report.html.j2"
-    return environment.from_string(source.read_text(encoding="utf-8"))
 
 
 def _entry(entry: Entry) -> list[str]:
