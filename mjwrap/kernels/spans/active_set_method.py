@@ -35,8 +35,8 @@ from mjwrap.kernels.spans.side_search import search_sides, try_other_sides
 from mjwrap.kernels.spans.span_ends import (
     an_end_is_inside,
     ends_in_short_segment,
+    explains_no_path,
     has_no_path,
-    lies_on_surfaces,
 )
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import GEODESICS_EVALUATED, NOT_EVALUATED, newton
@@ -80,7 +80,7 @@ def solve_active_set(lo, hi, ends, node, tol, direct):
                 continue
         saddle = tangent and changes == 0
         # an end inside a surface explains why there is no path: restarts seldom find one then
-        if out_of_restarts(lo, hi, restarts) or not lies_on_surfaces(lo, hi, ends, node):
+        if out_of_restarts(lo, hi, restarts) or explains_no_path(lo, hi, ends, node):
             status = lay.NOT_MINIMAL if saddle else lay.NOT_CONVERGED
             break
         evaluations += restart(lo, hi, ends, node, restarts, saddle, cold)

@@ -27,7 +27,7 @@ from mjwrap.kernels.spans.lift_off_touchdown import (
     touchdown,
 )
 from mjwrap.kernels.spans.saved_solutions import restore_solutions, save_solutions
-from mjwrap.kernels.spans.span_ends import lies_on_surfaces
+from mjwrap.kernels.spans.span_ends import explains_no_path
 from mjwrap.kernels.tangency.certify import is_local_minimum
 from mjwrap.kernels.tangency.newton import NOT_EVALUATED, newton
 
@@ -245,7 +245,7 @@ def try_random_hints(lo, hi, ends, node, sound):
     """
     spent = 0
     # an end inside a surface explains why there is no path
-    if not sound and not lies_on_surfaces(lo, hi, ends, node):
+    if not sound and explains_no_path(lo, hi, ends, node):
         return spent
     changed = False
     first_group = True

@@ -25,12 +25,26 @@ def an_end_is_inside(lo, hi, ends, node):
 
 
 @jit
-def _is_deep(k, ends, column, node):
-    """Return whether an end lies deeper inside obstacle k than AS_WRITTEN."""
+def _depth_and_rise(k, ends, column, node):
+    """Return an end's depth inside obstacle k, in the surface's size, and its distance from the middle along z."""
     x, y, z = into_frame(
         node, k, ends[0] + ends[column], ends[1] + ends[column + 1], ends[2] + ends[column + 2]
     )
-    return height(node, k, x, y, z) < -lay.AS_WRITTEN * node[k, lay.SIZE]
+    return -height(node, k, x, y, z) / node[k, lay.SIZE], abs(z)
+
+
+@jit
+def _is_deep(k, ends, column, node):
+    """Return whether an end lies deeper inside obstacle k than AS_WRITTEN, be it beyond the half length."""
+    depth, _ = _depth_and_rise(k, ends, column, node)
+    return depth > lay.AS_WRITTEN
+
+
+@jit
+def _is_deep_in_range(k, ends, column, node):
+    """Return whether an end lies deeper inside obstacle k than AS_WRITTEN where the surface exists."""
+    depth, rise = _depth_and_rise(k, ends, column, node)
+    return depth > lay.AS_WRITTEN and rise <= node[k, lay.Z_LIMIT]
 
 
 @no_inline
@@ -40,6 +54,19 @@ def lies_on_surfaces(lo, hi, ends, node):
         if _is_deep(k, ends, 3, node) or _is_deep(k, ends, 6, node):
             return False
     return True
+
+
+@no_inline
+def explains_no_path(lo, hi, ends, node):
+    """Return whether an end lies deep inside an obstacle where the surface exists, so that a path is unlikely.
+
+    An end inside the extension of a cone or a cylinder beyond its half length says nothing: paths that do not touch it
+    pass as if it were not there.
+    """
+    for k in range(lo, hi):
+        if _is_deep_in_range(k, ends, 3, node) or _is_deep_in_range(k, ends, 6, node):
+            return True
+    return False
 
 
 @no_inline
