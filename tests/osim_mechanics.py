@@ -28,10 +28,10 @@ class Written(NamedTuple):
         return mujoco.MjModel.from_xml_string(self.xml)
 
 
-def written(osim: OsimModel) -> Written:
-    """Write a model without meshes."""
+def written(osim: OsimModel, *, limits: bool = False) -> Written:
+    """Write a model without meshes; limits: whether clamped coordinates become limits."""
     document, report = Document("test"), Report(osim.name, osim.version)
-    skeleton = write_mechanics(document, osim, report)
+    skeleton = write_mechanics(document, osim, report, limits=limits)
     return Written(osim, skeleton, report, document.to_xml())
 
 

@@ -63,13 +63,6 @@ def test_locked_and_prescribed_coordinates_are_held():
     assert abs(data.qpos[2] - 0.9) > 0.01
 
 
-def test_clamped_coordinates_are_limited_only_where_they_start_inside():
-    osim = chain(clamped=True, count=3, range=(-1.0, 0.7))
-    compiled = written(osim).compile()
-    assert compiled.jnt_limited.tolist() == [1, 1, 0]
-    np.testing.assert_array_equal(compiled.jnt_range[0], [-1.0, 0.7])
-
-
 CONSTRAINTS = [
     PointConstraint("c", frame("b2", 0.3, 0.0, 0.0), frame("ground", 0.4, 0.35, 0.0)),
     DistanceConstraint("c", frame("b2", 0.3, 0.1, 0.0), frame("ground", 0.9, 0.1, 0.0), 0.5),

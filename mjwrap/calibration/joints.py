@@ -12,6 +12,7 @@ from mjwrap import validation
 from mjwrap.errors import ModelError, StateError
 from mjwrap.mjcf import MuscleDeclaration, name_of, names
 from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.model.kinematic_tree import crossed_dofs
 
 Array = NDArray[np.float64]
@@ -138,11 +139,8 @@ def _spans(
 ) -> dict[int, tuple[float, float]]:
     """Return the range of every joint with a range, by joint id."""
     known = names(model, mujoco.mjtObj.mjOBJ_JOINT, model.njnt)
-    spans = {
-        j: (float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1]))
-        for j in range(model.njnt)
-        if model.jnt_limited[j] and int(model.jnt_type[j]) in (*_SINGLE, _BALL)
-    }
+    own = {j: joint_range(model, j) for j in range(model.njnt)}
+    spans = {j: span for j, span in own.items() if span is not None}
     for name, (low, high) in ranges.items():
         if name not in known:
             raise ModelError(

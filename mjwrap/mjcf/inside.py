@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.kernels.layout import AS_WRITTEN
 from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.mjcf.joint_ranges import joint_range
 
 Array = NDArray[np.float64]
 POSES = 64
@@ -69,7 +70,7 @@ def side_is_inside(model: mujoco.MjModel, poses: mujoco.MjData, geom: int, site:
 def shares_inside(model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
     """Return, for pairs of geom and end point (site), the share of poses at which the end is inside (n,).
 
-    Poses: joints at random in their ranges; joints without limits, ball and free joints stay at the reference, and
+    Poses: joints at random in their ranges; joints without one, ball and free joints stay at the reference, and
     joints that follow others by an equality are where these put them. Each joint has a random generator of its own,
     seeded by its properties, so that the result is the same if the model is part of a larger one.
     """
@@ -79,7 +80,8 @@ def shares_inside(model: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
     geoms, sites = np.array(pairs).T
     radius, level = model.geom_size[geoms, 0], model.geom_type[geoms] == _CYLINDER
     data, coupled = mujoco.MjData(model), CoupledJoints(model)
-    joints = np.flatnonzero(np.asarray(model.jnt_limited, dtype=bool) & (model.jnt_type >= _SLIDE))
+    sliding = np.flatnonzero(model.jnt_type >= _SLIDE).tolist()
+    joints = np.array([j for j in sliding if joint_range(model, j) is not None], dtype=np.int64)
     low, high = model.jnt_range[joints].T
     what = [model.jnt_range, model.jnt_pos, model.jnt_axis, model.body_pos[model.jnt_bodyid]]
     seeds = [crc32(row.tobytes()) for row in np.concatenate(what, axis=1)[joints]]

@@ -15,6 +15,7 @@ from mjwrap.errors import StateError
 from mjwrap.mjcf import name_of
 from mjwrap.mjcf.coordinate_functions import CoordinateFunction, read_coordinate_functions
 from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.system.pieces import PieceSwitch
 
 Array = NDArray[np.float64]
@@ -137,9 +138,7 @@ def _solved(
     """Return the position of the joint that shows a coordinate."""
     joint = function.joint
     near = float(qpos[model.jnt_qposadr[joint]])
-    limited = bool(model.jnt_limited[joint])
-    low, high = (float(x) for x in model.jnt_range[joint]) if limited else (-np.inf, np.inf)
-    found = function.position(value, near, low, high)
+    found = function.position(value, near, *(joint_range(model, joint) or (-np.inf, np.inf)))
     if found is None:
         shown = name_of(model, OBJ.mjOBJ_JOINT, joint)
         raise StateError(f"coordinate '{name}' cannot be {value:g}: joint '{shown}' has no position for it")

@@ -71,7 +71,11 @@ class Imported(NamedTuple):
 
 
 def import_osim(
-    path: str | os.PathLike[str], *, meshes: Sequence[str | os.PathLike[str]] = (), poses: int = 60
+    path: str | os.PathLike[str],
+    *,
+    meshes: Sequence[str | os.PathLike[str]] = (),
+    poses: int = 60,
+    limits: bool = False,
 ) -> Imported:
     """Import an OpenSim model (.osim) as a MuJoCo model with geodesic muscles.
 
@@ -80,6 +84,8 @@ def import_osim(
         meshes: folders in which its mesh files are searched first; then the file's own folder and its Geometry are.
         poses: number of poses within the coordinates' ranges at which the places of wrap objects on their paths are
             chosen.
+        limits: whether clamped coordinates become limits of their joints. OpenSim heeds a clamp when a pose is set, not
+            in a motion, so by default joints have the range, but no limit.
 
     Returns:
         The model, a report on every element of the file, and the text to write.
@@ -97,11 +103,12 @@ def import_osim(
     )
     validation.require(good, "meshes", "a list of folders", meshes, OsimError)
     validation.whole(poses, 1, "poses", OsimError)
+    validation.flag(limits, "limits", OsimError)
     path = osim_file(path)
     model = read_osim(path)
     document, report = Document(model.name), Report(model.name, model.version)
     folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]
-    skeleton = write_mechanics(document, model, report, folders)
+    skeleton = write_mechanics(document, model, report, folders, bool(limits))
     write_paths(document, model, report, skeleton, poses)
     compiled = document.compile()
     data = mujoco.MjData(compiled)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.mjcf import name_of
 from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.mjcf.joint_ranges import joint_range
 
 Array = NDArray[np.float64]
 _KINDS = mujoco.mjtJoint
@@ -82,12 +83,12 @@ class PoseMaker:
         """Return the range to sweep [m or rad]: the joint's range, else half a turn or half the model's extent."""
         model = self.model
         kind = int(model.jnt_type[joint])
-        low, high = (float(x) for x in model.jnt_range[joint])
+        own = joint_range(model, joint)
         if kind == _BALL:
-            reach = high if model.jnt_limited[joint] else 0.5 * np.pi
+            reach = 0.5 * np.pi if own is None else own[1]
             return -reach, reach
-        if model.jnt_limited[joint] and high > low:
-            return low, high
+        if own is not None and own[1] > own[0]:
+            return own
         here = float(self.base[model.jnt_qposadr[joint]])
         reach = np.pi if kind == _HINGE else 0.5 * float(model.stat.extent)
         return here - reach, here + reach

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from mjwrap.errors import MjwrapError, ModelError, SignalError, TableError
 from mjwrap.files import Table
 from mjwrap.mjcf import name_of
-from mjwrap.poses.angles import BEYOND, TURNS, Angle
+from mjwrap.mjcf.joint_ranges import TURNS, joint_range
+from mjwrap.poses.angles import Angle, farthest
 
 OUTSIDE = 0.1  # [rad] a measured motion may leave a joint's range by less
 _DEGREES = re.compile(r"(deg|°)$")
@@ -60,30 +61,31 @@ def check_position(
 ) -> None:
     """Check positions [rad or m] of a hinge or slide that a user gives.
 
-    Raises `error`, which begins with `entry`, for a position half a turn or more outside a hinge's range, and for
-    degrees about a slide. Warns of other positions outside the range, and of more than two turns without a range.
+    Raises `error`, which begins with `entry`, for a position half a turn or more outside a hinge's range (more than two
+    turns where that is no limit), and for degrees about a slide. Warns of other positions outside the range, and of
+    more than two turns without a range.
     """
     given = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    turning, limited = int(model.jnt_type[joint]) == _HINGE, bool(model.jnt_limited[joint])
+    turning, own = int(model.jnt_type[joint]) == _HINGE, joint_range(model, joint)
     name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
     if not turning and isinstance(values, Angle):
         raise error(f"{entry}: joint '{name}' is a slide: give its position in m, without deg")
-    low, high = (float(x) for x in model.jnt_range[joint])
-    outside = np.maximum(low - given, given - high) if limited else np.full(given.shape, -np.inf)
-    k = int(np.argmax(outside if limited else np.abs(given)))
+    low, high = own or (-math.inf, math.inf)
+    outside = np.maximum(low - given, given - high)
+    k = int(np.argmax(np.abs(given) if own is None else outside))
     value, unit = float(given[k]), "rad" if turning else "m"
     instead = "" if isinstance(values, Angle) else f"; if degrees are meant, write {value:g}deg"
-    if turning and limited and outside[k] > BEYOND:
+    if turning and outside[k] > farthest(model, joint):
         raise error(
             f"{entry}: {value:g} rad are {abs(value) / (2.0 * math.pi):.3g} turns, far outside the range of joint "
             f"'{name}', {low:.4g} to {high:.4g} rad{instead}"
         )
-    if limited and outside[k] > 0.0:
+    if outside[k] > 0.0:
         warnings.warn(
             f"{entry} lies outside the joint's range, {low:g} to {high:g} {unit}" + instead * turning,
             stacklevel=3,
         )
-    elif turning and not limited and abs(value) > TURNS:
+    elif turning and own is None and abs(value) > TURNS:
         warnings.warn(
             f"{entry}: {value:g} rad are {abs(value) / (2.0 * math.pi):.3g} turns of joint '{name}'{instead}",
             stacklevel=3,
@@ -94,18 +96,18 @@ def check_column(model: mujoco.MjModel, joint: int, table: Table, column: str, o
     """Check the positions of a hinge in a column of a table, in the unit that its header gives.
 
     own: a column of a table that mjwrap wrote, in rad, whose motion may have gone anywhere. Raises `TableError` if the
-    positions are half a turn or more outside the joint's range, unless `own`; else warns, and also of positions more
-    than `OUTSIDE` outside it, unless `own`, and of more than two turns of a hinge without a range, which a wheel may
-    make.
+    positions are half a turn or more outside the joint's range (more than two turns where that is no limit), unless
+    `own`; else warns, and also of positions more than `OUTSIDE` outside it, unless `own`, and of more than two turns of
+    a hinge without a range, which a wheel may make.
     """
     if int(model.jnt_type[joint]) != _HINGE:
         return
     values = np.radians(table[column]) if table.in_degrees else table[column]
-    low, high = (float(x) for x in model.jnt_range[joint])
-    limited = bool(model.jnt_limited[joint])
-    outside = np.maximum(low - values, values - high) if limited else np.abs(values)
-    far = BEYOND if limited else TURNS
-    if not len(values) or not np.nanmax(outside) > (OUTSIDE if limited and not own else far):
+    span = joint_range(model, joint)
+    low, high = span or (0.0, 0.0)
+    outside = np.maximum(low - values, values - high)
+    far = farthest(model, joint)
+    if not len(values) or not np.nanmax(outside) > (OUTSIDE if span is not None and not own else far):
         return
     k = int(np.nanargmax(outside))
     name = name_of(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
@@ -117,7 +119,7 @@ def check_column(model: mujoco.MjModel, joint: int, table: Table, column: str, o
     )
     value = float(values[k])
     if outside[k] > far:
-        ranges = f"has a range of {low:.4g} to {high:.4g} rad" if limited else "has no range"
+        ranges = "has no range" if span is None else f"has a range of {low:.4g} to {high:.4g} rad"
         told = (
             f": {table[column][k]:g} at time {table.time[k]:g} s is {abs(value) / (2.0 * math.pi):.3g} turns, and "
             f"joint '{name}' {ranges}"
@@ -128,7 +130,7 @@ def check_column(model: mujoco.MjModel, joint: int, table: Table, column: str, o
             f"{high:.4g} rad"
         )
     words = f"'{table.source}', column '{column}'{told}; {instead}"
-    if limited and not own and outside[k] > far:
+    if span is not None and not own and outside[k] > far:
         raise TableError(words)
     warnings.warn(words, stacklevel=3)
 

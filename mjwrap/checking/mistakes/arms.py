@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, few, millimetres, muscle_of, quoted
 from mjwrap.checking.mistakes.pose import Posed
+from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.poses.joint_sweeps import PoseMaker
 from mjwrap.text import counted
 
@@ -58,7 +59,7 @@ def sign_changes(posed: Posed) -> Iterator[PossibleMistake]:
     told: dict[int, str] = {}
     for joint in maker.joints():
         turning = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_HINGE)
-        if maker.follows(joint) or not turning or not model.jnt_limited[joint]:
+        if maker.follows(joint) or not turning or joint_range(model, joint) is None:
             continue
         sweep = maker.sweep(joint, SAMPLES)
         arms = -np.array([posed.slopes(q, t) for q, t in zip(sweep.qpos, sweep.tangent, strict=True)])

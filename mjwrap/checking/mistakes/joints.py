@@ -9,10 +9,10 @@ import numpy as np
 
 from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, quoted
 from mjwrap.checking.mistakes.pose import Posed
+from mjwrap.mjcf.joint_ranges import TURNS, joint_range
 
 NARROW = np.radians(5.0)  # [rad] a hinge with a smaller range hardly moves
 IDLE = np.radians(0.3)  # [rad] a hinge that stays within this is meant to stand still
-TURNS = 4.0 * np.pi  # [rad] a hinge with a larger range turns more than twice
 LONG = 20.0  # [m] of all muscles
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -64,9 +64,10 @@ def _keyframes(model: mujoco.MjModel) -> Iterator[PossibleMistake]:
     """Yield a finding for every keyframe that puts a hinge half a turn or more outside its range."""
     for key in range(model.nkey):
         for joint in range(model.njnt):
-            if int(model.jnt_type[joint]) != _HINGE or not model.jnt_limited[joint]:
+            own = joint_range(model, joint)
+            if int(model.jnt_type[joint]) != _HINGE or own is None:
                 continue
-            low, high = (float(x) for x in model.jnt_range[joint])
+            low, high = own
             value = float(model.key_qpos[key, model.jnt_qposadr[joint]])
             if max(low - value, value - high) > np.pi:
                 yield PossibleMistake(

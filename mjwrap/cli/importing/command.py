@@ -37,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--geometry", nargs="+", action="extend", default=[], metavar="FOLDER", help="folders with the model's meshes, "
         "beside its own folder and the folder Geometry in it")  # fmt: skip
+    add("--limits", action="store_true", help="make clamped coordinates limits of their joints, as OpenSim's motions "
+        "do not; without it, joints have the ranges only")  # fmt: skip
     add("--report", metavar="FILE.html", help="write the report as a page")
     add_json(parser, "write the report")
     add("--verify", action="store_true", help="compare the written model with OpenSim")
@@ -63,6 +65,7 @@ def execute(options: argparse.Namespace) -> int:
             model=options.model,
             out=options.out,
             geometry=tuple(options.geometry),
+            limits=options.limits,
             page=options.report,
             json=options.json,
             verify=options.verify or options.numbers is not None,

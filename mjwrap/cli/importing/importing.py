@@ -23,6 +23,8 @@ from mjwrap.osim.importing import Imported
 from mjwrap.osim.verifying.differences import Verification, verify
 from mjwrap.osim.verifying.opensim_numbers import compute_reference, has_opensim
 from mjwrap.osim.verifying.reference import Reference, read_reference, sha256_of
+from mjwrap.osim.writing.skeleton import CLAMPED
+from mjwrap.text import counted
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,15 @@ class ImportSettings:
     """The settings of `mjwrap import`.
 
     model: the .osim file. out: the MJCF file, None for the model's name in the present folder. geometry: folders with
-    meshes. page, json: files, or None; json may be "-" for standard output. verify: compare with OpenSim, whose numbers
-    are kept in `numbers`, at `poses` random poses drawn with `seed`. command: the command line of this import.
+    meshes. limits: whether clamped coordinates become limits. page, json: files, or None; json may be "-" for standard
+    output. verify: compare with OpenSim, whose numbers are kept in `numbers`, at `poses` random poses drawn with
+    `seed`. command: the command line of this import.
     """
 
     model: str
     out: str | None
     geometry: tuple[str, ...]
+    limits: bool
     page: str | None
     json: str | None
     verify: bool
@@ -58,10 +62,14 @@ def import_model(settings: ImportSettings) -> int:
     page = open_output(settings.page, "--report", ".html", ".htm") if settings.page else None
     report = Report(settings.json)
     known = _numbers(settings) if settings.verify else None  # a mistake here is reported early
-    imported = import_osim(settings.model, meshes=settings.geometry)
+    imported = import_osim(settings.model, meshes=settings.geometry, limits=settings.limits)
     imported.save(out)
     report.say(f"{out}: {_contents(imported)}")
     report.say(tell_entries(imported.report))
+    clamped = sum(entry.kind == CLAMPED for entry in imported.report.entries)
+    if clamped and not settings.limits:
+        coordinates = counted(clamped, "clamped coordinate")
+        report.say(f"limits:    none for {coordinates}, as in OpenSim's motions; --limits writes them")
     found = _verify(settings, out, known) if settings.verify else None
     if found is not None:
         report.say()

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.mjcf import is_muscle, name_of
+from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.runs.excitation import control_names
 from mjwrap.runs.simulation import Simulation
 from mjwrap.system import CableSystem, MuscleSystem
@@ -142,12 +143,13 @@ def _outside(model: mujoco.MjModel, qpos: NDArray[np.float64], joint: int) -> st
     kind, adr = int(model.jnt_type[joint]), int(model.jnt_qposadr[joint])
     if kind not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
         return ""
-    low, high = model.jnt_range[joint].tolist()
-    if not model.jnt_limited[joint] or not max(low - qpos[adr], qpos[adr] - high) > LEFT * (high - low) > 0.0:
+    low, high = joint_range(model, joint) or (0.0, 0.0)
+    if not max(low - qpos[adr], qpos[adr] - high) > LEFT * (high - low) > 0.0:
         return ""
     ends = np.zeros((2, model.nq))
     ends[:, adr] = low, high
-    return f", outside its range of {' to '.join(_position(model, end, joint) for end in ends)}"
+    words = f", outside its range of {' to '.join(_position(model, end, joint) for end in ends)}"
+    return words if model.jnt_limited[joint] else words + ", which is no limit"
 
 
 def _rounded(value: float, digits: int) -> float:

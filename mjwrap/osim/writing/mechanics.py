@@ -19,14 +19,14 @@ from mjwrap.osim.writing.skeleton import Skeleton, write_bodies
 
 
 def write_mechanics(
-    document: Document, model: OsimModel, report: Report, folders: Sequence[Path] = ()
+    document: Document, model: OsimModel, report: Report, folders: Sequence[Path] = (), limits: bool = False
 ) -> Skeleton:
     """Write bodies, joints, couplings, constraints, forces other than muscles, contacts, markers and meshes.
 
-    folders: where mesh files are searched, in this order.
+    folders: where mesh files are searched, in this order. limits: whether clamped coordinates get limits.
     """
     write_options(document, model)
-    skeleton = write_bodies(document, model, report)
+    skeleton = write_bodies(document, model, report, limits)
     write_constraints(document, model, report, skeleton)
     report_inertias(document, report, skeleton)
     write_generalized_forces(document, model, report, skeleton)

@@ -26,6 +26,7 @@ from mjwrap.osim.writing.tree import Branch, branches_of
 # The inertia of a body that only shows a coordinate, as a share of the model's mass: the error of a coupling through it
 # grows as it gets smaller, 4e-10 s^2 times force by mass at 1 ms.
 CARRIER = 1e-5
+CLAMPED = "clamped Coordinate"  # the kind of a report's entry
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,8 @@ class Skeleton:
 
 
 class _Writer:
-    def __init__(self, document: Document, report: Report, drivers: Drivers) -> None:
-        self.document, self.report, self.drivers = document, report, drivers
+    def __init__(self, document: Document, report: Report, drivers: Drivers, limits: bool) -> None:
+        self.document, self.report, self.drivers, self.limits = document, report, drivers, limits
         self.taken = {*drivers.coordinates, *(each.joint for each in drivers.substitutes.values())}
         self.followers: list[tuple[str, float, str, Piecewise]] = []  # joint, reference, coordinate, function
         self.shown: set[str] = set()
@@ -104,12 +105,12 @@ class _Writer:
             self.shown.add(coordinate)
             axis = axis * float(motion.function(0.0, 1))
             reference = drivers.value(coordinate)
-            attributes.update(self.limits(drivers.coordinates[coordinate]))
+            attributes.update(self.range_of(drivers.coordinates[coordinate]))
         elif coordinate in drivers.substitutes and drivers.substitutes[coordinate].motion is motion:
             name = drivers.substitutes[coordinate].joint
             self.shown.add(coordinate)
             reference = motion.value(drivers.value)
-            attributes.update(self.limits(drivers.coordinates[coordinate], self.ranges[name]))
+            attributes.update(self.range_of(drivers.coordinates[coordinate], self.ranges[name]))
         else:
             name = self.name(f"{branch.joint.name}_{motion.name}")
             reference = motion.value(drivers.value)
@@ -119,17 +120,25 @@ class _Writer:
         self.references[name] = reference
         return {"name": name, **attributes, "axis": axis, "ref": reference}
 
-    def limits(self, coordinate: Coordinate, image: tuple[float, float] | None = None) -> dict[str, object]:
-        """Return range and limit of a coordinate's joint; what follows others, or starts outside, has no limit.
+    def range_of(self, coordinate: Coordinate, image: tuple[float, float] | None = None) -> dict[str, object]:
+        """Return range and limit of a coordinate's joint, and report them.
 
+        A clamp becomes a limit only if limits are wanted, and not of what follows others, is locked or starts outside.
         image: the range of the joint where that is not the coordinate's.
         """
         low, high = coordinate.range
         if not low < high:
             return {}
-        limited = coordinate.clamped and coordinate.name not in self.drivers.couplers
         inside = low <= self.drivers.value(coordinate.name) <= high
-        return {"range": image or (low, high), "limited": limited and inside and not coordinate.locked}
+        free = coordinate.name not in self.drivers.couplers and not coordinate.locked
+        limited = self.limits and coordinate.clamped and free and inside
+        kind = CLAMPED if coordinate.clamped else "unclamped Coordinate"
+        if limited:
+            self.report.add(kind, coordinate.name, APPROXIMATED, "a limit stops its joint; OpenSim heeds a clamp where "
+                            "a pose is set, not in a motion")  # fmt: skip
+        else:
+            self.report.add(kind, coordinate.name, EXACT, "its joint has the range, but no limit")
+        return {"range": image or (low, high), "limited": limited}
 
     def carrier(self, coordinate: Coordinate, least: float) -> None:
         """Write a body whose only joint shows a coordinate that no axis shows."""
@@ -137,7 +146,7 @@ class _Writer:
         turn = coordinate.motion != "translational"
         element = self.document.add("worldbody", "body", name=self.name(f"{name}_carrier"), gravcomp=1)
         self.document.add(element, "joint", name=name, type="hinge" if turn else "slide", axis=(1, 0, 0),
-                          ref=self.drivers.value(name), **self.limits(coordinate))  # fmt: skip
+                          ref=self.drivers.value(name), **self.range_of(coordinate))  # fmt: skip
         self.document.add(element, "inertial", pos=(0, 0, 0), mass=least, diaginertia=[least] * 3)
         self.report.add("Coordinate", name, APPROXIMATED,
                         f"no axis turns or slides one to one with it, so a body of its own shows it, of {least:.3g} kg "
@@ -197,13 +206,16 @@ class _Writer:
                         "rad or m" if written.error else "")  # fmt: skip
 
 
-def write_bodies(document: Document, model: OsimModel, report: Report) -> Skeleton:
-    """Write bodies, joints, coordinates and couplers; return what later parts need to know of them."""
+def write_bodies(document: Document, model: OsimModel, report: Report, limits: bool) -> Skeleton:
+    """Write bodies, joints, coordinates and couplers; return what later parts need to know of them.
+
+    limits: whether clamped coordinates get limits.
+    """
     branches = branches_of(model)
     drivers = drivers_of(model, branches)
     assemble(model, branches, drivers)
     inertias = written_inertias(model.bodies, branches)
-    writer = _Writer(document, report, drivers)
+    writer = _Writer(document, report, drivers, limits)
     for branch in branches:
         if not (branch.copy_of and branch.fixed):
             writer.body(branch, inertias[branch.body])
