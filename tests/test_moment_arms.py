@@ -153,8 +153,6 @@ def test_a_pull_drives_a_coordinate_up_where_its_moment_arm_is_positive() -> Non
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("q4", ["'q4' follows 'q1'", "by an equality", "give that joint, 'q1'"]),
-        ("q5", ["'q5' is held at a position", "by an equality"]),
         ("flaot", ["no joint 'flaot'", "did you mean 'float'", "joints: "]),
         ("elbow", ["no joint 'elbow'", "joints: ball, q1"]),
     ],

@@ -16,8 +16,9 @@ from mjwrap.osim.verifying.opensim_numbers import compute_reference
 MODELS = (
     "arm26", "BushingForceModel_30000", "CoupledCoordinatesMPPsMomentArmTest", "leg6dof9musc",
     "PathOnConstrainedBodyMomentArmTest", "StationDefinedFrames_Basic", "Tug_of_War_Millard",
-    "WrapPathCustomJointMomentArmTest",
+    "WrapPathCustomJointMomentArmTest", "knee_patella_ligament", "ThoracoscapularShoulderModel",
 )  # fmt: skip
+STILL = ("ThoracoscapularShoulderModel",)  # without motions, which OpenSim computes in minutes
 
 
 def main() -> None:
@@ -31,7 +32,9 @@ def main() -> None:
     options = parser.parse_args()
     if len(options.models) == 1:
         name = options.models[0]
-        reference = compute_reference(options.folder / f"{name}.osim", options.poses)
+        reference = compute_reference(
+            options.folder / f"{name}.osim", options.poses, motions=name not in STILL
+        )
         reference.save(options.output / f"verify_{name}.json")
         return
     for name in options.models:

@@ -1,4 +1,4 @@
-"""Tell by its name what a `<custom>` tuple declares: a muscle, a coupling, a moving point, or a coordinate."""
+"""Tell by its name what a `<custom>` tuple declares: a muscle, a coupling, a moving point, a coordinate, or axes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ OURS = "mjwrap"  # in the names of all tuples that mjwrap reads
 COUPLING = "mjwrap_coupling_"  # pieces of a coupling of joints (`coupling_pieces.py`)
 MOVING = "mjwrap_moving_"  # a site that moves in its body's frame
 
-COORDINATE = "mjwrap_coordinate_"  # a coordinate of an OpenSim model that is a function of a joint
-_OTHERS = COUPLING, MOVING, COORDINATE
+COORDINATE = "mjwrap_coordinate_"  # a coordinate of an OpenSim model that is no joint's qpos
+AXES = "mjwrap_axes"  # joints that are no coordinates: axes of a joint of an OpenSim model
+_OTHERS = COUPLING, MOVING, COORDINATE, AXES
 
 
 def is_ours(name: str) -> bool:

@@ -15,13 +15,14 @@ from mjwrap.errors import StateError
 from mjwrap.mjcf import name_of
 from mjwrap.mjcf.coordinate_functions import CoordinateFunction, read_coordinate_functions
 from mjwrap.mjcf.couplings import CoupledJoints
-from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.system.pieces import PieceSwitch
+from mjwrap.system.projection import Projection
 
 Array = NDArray[np.float64]
 OBJ, _KINDS = mujoco.mjtObj, mujoco.mjtJoint
 _SCALAR = int(_KINDS.mjJNT_SLIDE), int(_KINDS.mjJNT_HINGE)
-CLOSE = 1e-9  # largest difference of a value that is already there [rad or m], relative above 1
+CLOSE = 1e-9  # largest difference of a value that couplings give [rad or m], relative above 1
+TIED = 1e-7  # the same of a value that other equalities give
 
 
 def coordinates(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
@@ -47,40 +48,45 @@ def coordinates(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
 
 
 def set_coordinates(model: mujoco.MjModel, data: mujoco.MjData, values: Mapping[str, float]) -> None:
-    """Set coordinates by name, and all joints that follow them by couplers, splines or other equalities.
+    """Set coordinates by name, and all joints that couplers, splines, loops and other equalities tie to them.
 
-    Other coordinates keep their values. Only `data.qpos` and, for couplings of several pieces, `data.eq_active` are
-    written; call `mj_forward` afterwards, and `reset` of a `MuscleSystem`. A value outside the range of its joint is
-    set as it is. If an error is raised, nothing has been written.
+    The coordinates move from their present values in strides, and each pose is projected on the active equalities, so
+    that loops stay on the branch on which they are. Joints that equalities tie to the given ones move as little as
+    possible; all others keep their values. Afterwards the error of each equality is below 1e-11 m or rad. Only
+    `data.qpos` and, for couplings of several pieces, `data.eq_active` are written; call `mj_forward` afterwards, and
+    `reset` of a `MuscleSystem`. A value outside the range of its joint is set as it is. If an error is raised, nothing
+    has been written.
 
     Args:
         model: any model, imported from OpenSim or not.
         data: the state.
-        values: value by name [rad or m]. A coordinate that follows others, or is locked, may only be given with the
-            value that it has then anyway.
+        values: value by name [rad or m]. A coordinate that follows others by a coupler, or is locked, may only be given
+            with the value that it has then anyway; values of coordinates that other equalities tie have to fit each
+            other, within 1e-7.
 
     Raises:
-        StateError: there is no such coordinate, it follows others or is locked at another value, or a value is not a
-            finite number.
+        StateError: there is no such coordinate, it follows others or is locked at another value, a value is not a
+            finite number, or no pose with these values satisfies the equalities.
         ModelError: a declaration of a coordinate or a coupling is wrong.
     """
     _check(model, data)
     if not isinstance(values, Mapping):
         raise StateError(f"values must be a dict of values by coordinate, not {validation.described(values)}")
-    functions, couplings = read_coordinate_functions(model), CoupledJoints(model)
+    functions, projection = read_coordinate_functions(model), Projection(model)
+    couplings = projection.couplings
     wanted = {_known(model, functions, name): _number(name, value) for name, value in values.items()}
-    qpos = data.qpos.copy()
+    given: dict[int, float] = {}
     for name, value in wanted.items():
         joint = _joint(model, name)
-        function = None if joint >= 0 else functions[name]
-        if function is not None and function.own:
-            qpos[model.jnt_qposadr[function.joint]] = _solved(model, qpos, name, function, value)
-        elif joint >= 0 and joint not in couplings.leader:
-            qpos[model.jnt_qposadr[joint]] = value
-    couplings.place(qpos)
+        if joint >= 0 and joint not in couplings.leader:
+            given[joint] = value
+        elif joint < 0 and functions[name].own and functions[name].joint not in couplings.leader:
+            given[functions[name].joint] = functions[name].position(value)
+    qpos = projection.place(data, given)
     found = _values(model, qpos, functions)
+    close = TIED if projection.equalities.active(data) else CLOSE
     for name, value in wanted.items():
-        if abs(found[name] - value) > CLOSE * max(1.0, abs(value)):
+        if abs(found[name] - value) > close * max(1.0, abs(value)):
             raise StateError(_contradiction(model, functions, couplings, name, value, found[name]))
     data.qpos[:] = qpos
     PieceSwitch(model).set(data)
@@ -132,19 +138,6 @@ def _number(name: str, value: object) -> float:
     return float(value)  # pyright: ignore[reportArgumentType]
 
 
-def _solved(
-    model: mujoco.MjModel, qpos: Array, name: str, function: CoordinateFunction, value: float
-) -> float:
-    """Return the position of the joint that shows a coordinate."""
-    joint = function.joint
-    near = float(qpos[model.jnt_qposadr[joint]])
-    found = function.position(value, near, *(joint_range(model, joint) or (-np.inf, np.inf)))
-    if found is None:
-        shown = name_of(model, OBJ.mjOBJ_JOINT, joint)
-        raise StateError(f"coordinate '{name}' cannot be {value:g}: joint '{shown}' has no position for it")
-    return found
-
-
 def _contradiction(
     model: mujoco.MjModel,
     functions: Mapping[str, CoordinateFunction],
@@ -155,7 +148,10 @@ def _contradiction(
 ) -> str:
     """Return why a coordinate cannot be set to a value; there: the value that it has instead."""
     joint = _joint(model, name)
-    heads = couplings.heads(joint if joint >= 0 else functions[name].joint)
+    shown = joint if joint >= 0 else functions[name].joint
+    heads = couplings.heads(shown)
+    if heads == [shown] and (joint >= 0 or functions[name].own):
+        return f"equalities of the model tie coordinate '{name}' to others: it is {there:.9g}, and cannot be {value:.9g}"
     led = " and ".join(f"'{name_of(model, OBJ.mjOBJ_JOINT, head)}'" for head in heads)
     if not heads:
         return f"coordinate '{name}' is locked at {there:.9g} by an equality of the model, and cannot be {value:.9g}"

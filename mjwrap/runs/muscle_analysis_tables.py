@@ -17,6 +17,7 @@ from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.muscles.energetics import Energetics, Umberger2010, basal_power
 from mjwrap.muscles.fibers import FiberState
 from mjwrap.system import MuscleSystem
+from mjwrap.system.moment_arms import CoordinateMotions
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ class MuscleAnalysisTables:
 
     The files PREFIX_MuscleAnalysis_QUANTITY.sto are those of `WHOLE` and `FIBERS`, and MomentArm_JOINT and
     Moment_JOINT for every degree of freedom that moves a muscle, 0 for muscles that it does not move. Moment arms are
-    −dl/dq with coupled joints moved along, as in OpenSim; about a joint that follows another one they are −∂l/∂q alone.
+    those of `MuscleSystem.moment_arms`, as in OpenSim; about a joint that cannot move they are 0.
     PREFIX_ProbeReporter_probes.sto has the metabolic power [W] of OpenSim's Umberger2010MuscleMetabolicsProbe with its
     default constants: metabolics_TOTAL, metabolics_BASAL and metabolics_MUSCLE. SI units, angles in rad. open_file:
     opens the `PartFile` of such a name. Raises `RecordingError` if a file cannot be written.
@@ -88,7 +89,7 @@ class MuscleAnalysisTables:
     ) -> None:
         self._muscles = muscles
         self._open = open_file
-        self._couplings = CoupledJoints(model)
+        self._motions = CoordinateMotions(model, CoupledJoints(model))
         self._parts: list[_Part] = []
         names, dofs = muscles.names, dof_names(model)
         fibers = [i for i, m in enumerate(muscles.declarations) if hasattr(m.parameters, "tendon")]
@@ -97,7 +98,8 @@ class MuscleAnalysisTables:
         for quantity, read in FIBERS.items() if fibers else ():
             with_fibers = [names[i] for i in fibers]
             self._add(f"{prefix}_MuscleAnalysis", quantity, with_fibers, _only(read, fibers))
-        for dof in self._moving(model):
+        self._dofs = self._moving(model)
+        for dof in self._dofs:
             name = dofs[dof].replace("/", "_")
             self._add(f"{prefix}_MuscleAnalysis", f"MomentArm_{name}", names, lambda s, d=dof: s.arms[:, d])
             self._add(
@@ -114,13 +116,16 @@ class MuscleAnalysisTables:
             self._add(f"{prefix}_ProbeReporter", "probes", heads, metabolic)
 
     def _moving(self, model: mujoco.MjModel) -> list[int]:
-        """Return the degrees of freedom that move a muscle, alone or with those that follow them."""
+        """Return the degrees of freedom that move a muscle, alone or with those that equalities tie to them."""
         crossed = np.atleast_1d(crossed_dofs(model, self._muscles.declarations).any(axis=0))
         moving = crossed.copy()
-        leaders = self._couplings.leader
-        for joint in leaders:
-            for head in self._couplings.heads(joint):
+        couplings = self._motions.couplings
+        for joint in couplings.leader:
+            for head in couplings.heads(joint):
                 moving[model.jnt_dofadr[head]] |= crossed[model.jnt_dofadr[joint]]
+        rest = mujoco.MjData(model)
+        for dof in np.flatnonzero(~moving):
+            moving[dof] = (self._motions.along(rest, int(dof))[crossed] != 0.0).any()
         return np.flatnonzero(moving).tolist()
 
     def _add(self, prefix: str, quantity: str, names: list[str], read: Read) -> None:
@@ -131,9 +136,10 @@ class MuscleAnalysisTables:
 
     def log(self, data: mujoco.MjData) -> None:
         """Write the results at the present state."""
-        muscles, couplings = self._muscles, self._couplings
-        arms = -muscles.length_jacobian(data)
-        arms[:, couplings.independent] = arms @ couplings.matrix(data.qpos)
+        muscles, arms = self._muscles, np.zeros((self._muscles.n, data.qvel.size))
+        jacobian = muscles.length_jacobian(data)
+        for dof in self._dofs:
+            arms[:, dof] = -jacobian @ self._motions.along(data, dof)
         energy = muscles.energetics(Umberger2010())
         sample = _Sample(arms, muscles.fiber_state(), energy, muscles.length, muscles.tension)
         for part in self._parts:

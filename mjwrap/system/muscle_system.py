@@ -26,7 +26,7 @@ from mjwrap.system.callback import control_callback
 from mjwrap.system.checks import resets
 from mjwrap.system.derivatives import length_jacobian_rate
 from mjwrap.system.evaluator import Evaluator
-from mjwrap.system.moment_arms import independent_coordinates, moment_arms
+from mjwrap.system.moment_arms import CoordinateMotions
 from mjwrap.system.results import Array
 from mjwrap.system.state import State
 
@@ -128,34 +128,38 @@ class MuscleSystem(Evaluator):
 
         A joint that follows another by an equality of the model (`<equality><joint polycoef>`) is not independent.
         """
-        return independent_coordinates(self.model, self._couplings)
+        return self._motions.independent
 
     @cached_property
-    def _couplings(self) -> CoupledJoints:
-        return CoupledJoints(self.model)
+    def _motions(self) -> CoordinateMotions:
+        return CoordinateMotions(self.model, CoupledJoints(self.model))
 
     def moment_arms(self, data: mujoco.MjData, coordinates: Iterable[str] | None = None) -> Array:
-        """Return moment arms (n, k) about independent joints at the present qpos [m], about a slide [-].
+        """Return moment arms (n, k) about coordinates at the present qpos [m], about a slide [-].
 
-        Joints that follow a coordinate by an equality of the model move with it, so a column is the negative slope of
-        the lengths along the coupled motion: −J N, with J = ∂l/∂q of `length_jacobian`, which is called first, and
-        N = ∂q/∂q_independent. The equalities are those that are active at the model's start, in the pieces that hold at
-        qpos; followers are taken where qpos has them. Writes nothing to `data`. Positive, as in OpenSim, if the
-        muscle's pull drives the coordinate up. A muscle without a path has the moment arms of its last valid path, 0
-        before it had one.
+        A column is the negative slope of the lengths along a motion N in which the coordinate has the rate 1: −J N,
+        with J = ∂l/∂q of `length_jacobian`, which is called first. Joints that follow the coordinate by an equality of
+        the model move with it. Where other active equalities (loops, points, welds, distances) tie coordinates, N is
+        OpenSim's: of all motions that satisfy them, the one with the least sum of squares of the rates of all
+        coordinates, N = P eᵢ / Pᵢᵢ with the projector P on those motions. So it is for a coordinate that follows others,
+        too; a locked one moves as if its lock were open and those of others closed. Couplings of joints are those that
+        are active at the model's start, in the pieces that hold at qpos, and other equalities those that are active in
+        `data`; qpos should satisfy them (`mw.osim.set_coordinates`). Writes nothing to `data`. Positive, as in OpenSim,
+        if the muscle's pull drives the coordinate up. A muscle without a path has the moment arms of its last valid
+        path, 0 before it had one.
 
         Args:
-            data: the state; only poses are used.
-            coordinates: a joint's name, or several, whose columns are returned in this order; by default all of the
-                property `coordinates`. A ball joint has three columns (rotations about the axes of its body), a free
-                joint six (translations in the world, then rotations about the body's axes), as in qvel; they are
-                returned only if they are named.
+            data: the state; only poses and `eq_active` are used.
+            coordinates: the name of a joint, or of a coordinate of an imported model, or several, whose columns are
+                returned in this order; by default all of the property `coordinates`. A ball joint has three columns
+                (rotations about the axes of its body), a free joint six (translations in the world, then rotations
+                about the body's axes), as in qvel; they are returned only if they are named.
 
         Raises:
-            GeometryError: no such joint, or it follows another one.
+            GeometryError: no such joint, or equalities hold it where it is.
         """
         jacobian = self.length_jacobian(data)
-        return moment_arms(self.model, self._couplings, jacobian, data.qpos, coordinates)
+        return -jacobian @ self._motions.columns(data, coordinates)
 
     def length_jacobian_rate(self, data: mujoco.MjData, direction: ArrayLike | None = None) -> Array:
         """Return the rate of ∂l/∂q (n, nv) as q moves along `direction` (nv,), by default along qvel.

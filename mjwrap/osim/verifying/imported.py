@@ -9,18 +9,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf.coordinate_functions import read_coordinate_functions
+from mjwrap.errors import GeometryError
+from mjwrap.mjcf.coordinate_functions import read_axis_joints, read_coordinate_functions
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.bench import simulate_muscle
 from mjwrap.osim.coordinates import coordinates, set_coordinates
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
 from mjwrap.system import MuscleSystem
+from mjwrap.system.moment_arms import CoordinateMotions
 
 Array = NDArray[np.float64]
 # OpenSim's reference motions have gravity and, if driven, muscles. MuJoCo's other forces are switched off by these
 # flags, and springs and dampers by their constants, as couplings in pieces need a passive stage.
 DRIVEN_OFF = ("LIMIT", "CONTACT")
-CLOSED = 1e-6  # largest rate of a constraint's error in a motion that satisfies it
 PASSIVE_OFF = (*DRIVEN_OFF, "ACTUATION")
 SPRINGS = ("jnt_stiffness", "dof_damping", "tendon_stiffness", "tendon_damping")
 
@@ -48,11 +49,17 @@ class ImportedModel:
         self.data = mujoco.MjData(model)
         self.muscles = MuscleSystem(model)
         self._joints = {model.joint(i).name: i for i in range(model.njnt)}
-        own = [name for name, function in read_coordinate_functions(model).items() if function.own]
-        self.settable = [*self.muscles.coordinates, *own]
+        self._functions = read_coordinate_functions(model)
+        self._motions = CoordinateMotions(model, CoupledJoints(model))
+        own = [name for name, function in self._functions.items() if function.own]
+        axes = read_axis_joints(model)
+        self.settable = [name for name in self.muscles.coordinates if self._joints[name] not in axes] + own
 
     def at(self, pose: PoseNumbers, independent: list[str], activations: list[float]) -> ImportedNumbers:
-        """Return the numbers at a pose of OpenSim's; coordinates that follow others by a function are not set."""
+        """Return the numbers at a pose of OpenSim's; coordinates that follow others by a function are not set.
+
+        Raises `StateError` where no pose with these values satisfies the equalities.
+        """
         model, data, muscles = self.model, self.data, self.muscles
         mujoco.mj_resetData(model, data)
         free = [name for name in self.settable if name in pose.coordinates]
@@ -68,14 +75,7 @@ class ImportedModel:
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
         touched = {name: len(muscles.contact_points(i)) for i, name in enumerate(muscles.names)}
-        arms: dict[str, dict[str, float]] = {}
-        if pose.moment_arms:
-            known = set(muscles.coordinates)
-            about = [name for name in independent if name in known]
-            found = muscles.moment_arms(data, about)
-            arms = {
-                name: dict(zip(about, found[i].tolist(), strict=True)) for i, name in enumerate(muscles.names)
-            }
+        arms = self._arms(pose, independent) if pose.moment_arms else {}
         tensions, laws = {}, {}
         for name in pose.tensions:
             if name not in muscles:
@@ -95,27 +95,50 @@ class ImportedModel:
         ]
         return np.array(found)
 
+    def _arms(self, pose: PoseNumbers, independent: list[str]) -> dict[str, dict[str, float]]:
+        """Return moment arms about the coordinates, or about OpenSim's speeds where these are not their rates."""
+        data, muscles, found = self.data, self.muscles, {name: {} for name in self.muscles.names}
+        known = [name for name in independent if self.knows(name)]
+        if pose.speeds is None:
+            arms = muscles.moment_arms(data, known)
+            columns = dict(zip(known, arms.T, strict=True))
+        else:
+            names = list(pose.coordinates)
+            rates = np.array([self._rate(name) for name in names])
+            jacobian, columns = muscles.length_jacobian(data), {}
+            for name in known:
+                along = self._motions.of_speed(data, np.array(pose.speeds) @ rates, names.index(name))
+                if along is not None:
+                    columns[name] = -jacobian @ along
+        for coordinate, column in columns.items():
+            for muscle, arm in zip(muscles.names, column.tolist(), strict=True):
+                found[muscle][coordinate] = arm
+        return found
+
+    def knows(self, name: str) -> bool:
+        """Return whether the model has a coordinate."""
+        return name in self._joints or name in self._functions
+
+    def _rate(self, name: str) -> Array:
+        """Return the rate (nv,) of a coordinate as a function of qvel; zeros for one that the model does not have."""
+        model, found = self.model, np.zeros(self.model.nv)
+        if name in self._joints:
+            found[model.jnt_dofadr[self._joints[name]]] = 1.0
+        elif name in self._functions:
+            function = self._functions[name]
+            position = float(self.data.qpos[model.jnt_qposadr[function.joint]])
+            found[model.jnt_dofadr[function.joint]] = function.rate(position)
+        return found
+
     def _mass(self, independent: list[str]) -> Array | None:
-        """Return NᵀMN about the rates of the independent coordinates, N from MuJoCo's equalities; None where these
-        leave other motions free, or a coordinate is no joint."""
+        """Return NᵀMN about the rates of the independent coordinates; None where a coordinate does not move."""
         model, data = self.model, self.data
-        if model.nv == 0 or any(name not in self._joints for name in independent):
+        if model.nv == 0 or not all(self.knows(name) for name in independent):
             return None
-        chosen = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
-        follow = np.setdiff1d(np.arange(model.nv), chosen)
-        product, columns = np.zeros(data.nefc), []
-        for unit in np.eye(model.nv):
-            mujoco.mj_mulJacVec(model, data, product, unit)
-            columns.append(product.copy())
-        equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
-        jacobian = np.array(columns).reshape(model.nv, -1).T[equal]
-        n = np.zeros((model.nv, len(chosen)))
-        n[chosen, np.arange(len(chosen))] = 1.0
-        if follow.size:
-            solved, _, rank, _ = np.linalg.lstsq(jacobian[:, follow], -jacobian[:, chosen], rcond=None)
-            n[follow] = solved
-            if rank < follow.size or np.abs(jacobian @ n).max(initial=0.0) > CLOSED:
-                return None
+        try:
+            n = self._motions.columns(data, independent)
+        except GeometryError:
+            return None
         inertia = np.zeros(model.nv)
         moments = []
         for column in n.T:

@@ -22,7 +22,10 @@ WIDEST = {
     1: math.pi,
     2: 1.0,
 }  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
-CLOSED = 1e-6  # largest rate of a constraint's error in a motion that satisfies it
+ASSEMBLED = 1e-10  # largest error of OpenSim's constraints at a pose [m or rad]
+HALVINGS = 8  # how often a pose is drawn nearer to the default one
+RANK, MOVES = 1e-10, 1e-9  # shares of the largest singular value, and of a coordinate's own motion, that count
+SAME = 1e-12  # difference of speeds from the coordinates' rates that is rounding
 PASSIVE, DRIVEN = 0.3, 0.5  # durations of motions [s]
 EXCITATION = 0.2
 
@@ -123,14 +126,32 @@ class _Computer:
         )
 
     def _draw(self, rng: np.random.Generator) -> None:
-        """Move the model to a random pose within the ranges of its coordinates."""
+        """Move the model to a random pose within the ranges of its coordinates.
+
+        OpenSim's assembly of constraints stops far from a solution where it starts far away. So the values are drawn
+        nearer to the default ones until it succeeds; a note says so if it never does.
+        """
+        drawn = {}
         for name in self.independent:
             coordinate = self.coordinates[name]
             widest = WIDEST.get(int(coordinate.getMotionType()), math.pi)
             low, high = max(coordinate.getRangeMin(), -widest), min(coordinate.getRangeMax(), widest)
-            value = rng.uniform(low, high) if low < high else coordinate.getDefaultValue()
-            coordinate.setValue(self.state, float(value), False)
-        self.model.assemble(self.state)
+            drawn[name] = rng.uniform(low, high) if low < high else coordinate.getDefaultValue()
+        for halving in range(HALVINGS):
+            for name, value in drawn.items():
+                start = self.coordinates[name].getDefaultValue()
+                self.coordinates[name].setValue(
+                    self.state, float(start + (value - start) * 0.5**halving), False
+                )
+            self.model.assemble(self.state)
+            self.model.realizePosition(self.state)
+            errors = self.state.getQErr()
+            if max((abs(errors.get(i)) for i in range(errors.size())), default=0.0) <= ASSEMBLED:
+                return
+            self.state = self.model.initSystem()  # OpenSim's solver does not recover by itself
+        note = "OpenSim's assembly did not satisfy the constraints at some poses"
+        if note not in self.notes:
+            self.notes.append(note)
 
     def _pose(self, with_arms: bool) -> PoseNumbers:
         model, state = self.model, self.state
@@ -145,7 +166,7 @@ class _Computer:
                 turn.get(i, j) for i in range(3) for j in range(3)
             ]
         values = {name: float(c.getValue(state)) for name, c in self.coordinates.items()}
-        mass = self._mass()
+        mass, speeds = self._mass()
         lengths = {name: float(path_of(found).getLength(state)) for name, found in self.paths.items()}
         arms: dict[str, dict[str, float]] = {}
         if with_arms:
@@ -161,7 +182,7 @@ class _Computer:
             if (found := contacts(self.opensim, path_of(force), state))
         }
         slopes = length_slopes(model, state, self._curved, self._movable) if with_arms else {}
-        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes)
+        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes, speeds)
 
     def _tensions(self, muscle: Any) -> list[float | None]:
         """Return the tension of a muscle at equilibrium, at rest, at each of the activations."""
@@ -176,8 +197,11 @@ class _Computer:
                 found.append(None)
         return found
 
-    def _mass(self) -> list[list[float]] | None:
-        """Return NᵀMN about the rates of the independent coordinates, from Simbody's M and constraint matrix."""
+    def _mass(self) -> tuple[list[list[float]] | None, list[list[float]] | None]:
+        """Return NᵀMN about the rates of the independent coordinates, and each coordinate's speed u from all rates if they differ.
+
+        Column i of N is P eᵢ / Pᵢᵢ, with the projector P on the rates that satisfy Simbody's constraints.
+        """
         model, state, opensim = self.model, self.state, self.opensim
         matter = model.getMatterSubsystem()
         mass = opensim.Matrix()
@@ -185,28 +209,39 @@ class _Computer:
         size = mass.nrow()
         m = np.array([[mass.get(i, j) for j in range(size)] for i in range(size)]).reshape(size, size)
         if len(self.coordinates) != size or not self.independent:
-            return None
-        rates = self._rates(size)  # (coordinates, u)
+            return None, None
+        speeds = np.linalg.inv(self._rates(size))  # u from the coordinates' rates
         names = list(self.coordinates)
         chosen = [names.index(name) for name in self.independent]
-        inverse = np.linalg.inv(rates)  # u from the coordinates' rates
         constraints = opensim.Matrix()
         matter.calcG(state, constraints)
         rows = constraints.nrow()
         g = np.array([[constraints.get(i, j) for j in range(size)] for i in range(rows)]).reshape(rows, size)
-        follow = [i for i in range(size) if i not in chosen]
-        n = np.zeros((size, len(chosen)))
-        n[chosen, np.arange(len(chosen))] = 1.0
-        if follow:
-            of_rates = g @ inverse
-            solved, _, rank, _ = np.linalg.lstsq(of_rates[:, follow], -of_rates[:, chosen], rcond=None)
-            n[follow] = solved
-            if rank < len(follow) or np.abs(of_rates @ n).max(initial=0.0) > CLOSED:
-                return None
-        elif rows and np.abs(g @ inverse @ n).max(initial=0.0) > CLOSED:
-            return None
-        reduced = (inverse @ n).T @ m @ (inverse @ n)
-        return reduced.tolist()
+        of_rates = g @ speeds
+        projector = np.eye(size) - np.linalg.pinv(of_rates, rcond=RANK) @ of_rates
+        own = np.diag(projector)[chosen]
+        by_coordinate = speeds[self._speed_places()]
+        same = np.abs(by_coordinate - np.eye(size)).max() < SAME
+        kept = None if same else by_coordinate.tolist()
+        if own.min() < MOVES:
+            return None, kept
+        n = speeds @ (projector[:, chosen] / own)
+        return (n.T @ m @ n).tolist(), kept
+
+    def _speed_places(self) -> list[int]:
+        """Return the place in u of the speed of each coordinate."""
+        state, found = self.state, []
+        for coordinate in self.coordinates.values():
+            state.setU(self.opensim.Vector(state.getNU(), 0.0))
+            locked = coordinate.getLocked(state)
+            coordinate.setLocked(state, False)
+            coordinate.setSpeedValue(state, 1.0)
+            speeds = state.getU()
+            found.append(int(np.argmax([speeds.get(i) for i in range(speeds.size())])))
+            coordinate.setLocked(state, locked)
+        state.setU(self.opensim.Vector(state.getNU(), 0.0))
+        self.model.realizeVelocity(state)
+        return found
 
     def _rates(self, size: int) -> Array:
         """Return the rates of the coordinates for each unit velocity u, (coordinates, u)."""

@@ -35,6 +35,9 @@ class PoseNumbers:
     slopes: dict[
         str, dict[str, list[float]]
     ]  # by path over surfaces and coordinate: slopes of the length on either side
+    speeds: list[list[float]] | None = (
+        None  # OpenSim's speeds u from the rates of all coordinates, in their order, where they are not the same
+    )
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,8 @@ def _fault(found: Reference) -> str:
         checked += [
             ("tensions", [0.0 if t is None else t for t in ts], (count,)) for ts in pose.tensions.values()
         ]
+        if pose.speeds is not None:
+            checked.append(("speeds", pose.speeds, (len(pose.coordinates),) * 2))
         if pose.mass is not None:
             checked.append(("mass", pose.mass, (len(found.independent),) * 2))
         for what, values, shape in checked:

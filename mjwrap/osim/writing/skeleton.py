@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from mjwrap.mjcf.tuple_names import AXES, COORDINATE
 from mjwrap.osim.description.bodies import Coordinate
 from mjwrap.osim.description.functions import Array, Piecewise, linear
 from mjwrap.osim.description.model import OsimModel
@@ -13,7 +15,7 @@ from mjwrap.osim.report import APPROXIMATED, EXACT, Report
 from mjwrap.osim.writing.assembly import assemble
 from mjwrap.osim.writing.couplings import write_coupling
 from mjwrap.osim.writing.document import Document
-from mjwrap.osim.writing.drivers import Drivers, drivers_of
+from mjwrap.osim.writing.drivers import Drivers, Substitute, drivers_of
 from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
 from mjwrap.osim.writing.inertias import Written, written_inertias
 from mjwrap.osim.writing.motions import Motion, evaluated
@@ -168,15 +170,43 @@ class _Writer:
             driver = self.drivers.driver(name)
             if driver is None or driver[1] is None:
                 continue
+            substitute = self.drivers.substitutes.get(name)
+            if substitute is not None:
+                self.substitute(name, substitute)
+                continue
             data = flattened(driver[1])
             if len(data) <= MOST_NUMBERS:
-                record = self.document.add("custom", "tuple", name=f"mjwrap_coordinate_{name}")
-                numeric = self.document.numeric(f"mjwrap_coordinate_{name}_function", data)
-                self.document.add(record, "element", objtype="joint", objname=driver[0])
-                self.document.add(record, "element", objtype="numeric", objname=numeric)
+                self.tuple(name, driver[0], None, {"function": data})
             self.report.add("Coordinate", name, EXACT if name in self.drivers.couplers else APPROXIMATED,
                             f"a function of joint '{driver[0]}', in {len(driver[1].origins)} pieces",
                             driver[1].error or float("nan"), "rad or m" if driver[1].error else "")  # fmt: skip
+
+    def substitute(self, name: str, substitute: Substitute) -> None:
+        """Write that a joint is a function of a coordinate."""
+        function = substitute.motion.function
+        data = flattened(function)
+        if len(data) <= MOST_NUMBERS:
+            self.tuple(name, substitute.joint, 1, {"function": data, "range": substitute.extent})
+        count = len(function.origins)
+        self.report.add("Coordinate", name, EXACT, f"joint '{substitute.joint}' is a function of it, in {count} "
+                        f"piece{'s' * (count > 1)}; what follows it follows the joint")  # fmt: skip
+
+    def tuple(self, name: str, joint: str, mark: int | None, numerics: Mapping[str, Iterable[float]]) -> None:
+        """Write the tuple of a coordinate: a joint with a mark, and numerics by the ends of their names."""
+        record = self.document.add("custom", "tuple", name=f"{COORDINATE}{name}")
+        self.document.add(record, "element", objtype="joint", objname=joint, prm=mark)
+        for end, data in numerics.items():
+            numeric = self.document.numeric(f"{COORDINATE}{name}_{end}", data)
+            self.document.add(record, "element", objtype="numeric", objname=numeric)
+
+    def axes(self) -> None:
+        """Write which joints are axes only: a tuple."""
+        only = [name for name, _ in self.joints if name not in self.drivers.coordinates]
+        if not only:
+            return
+        record = self.document.add("custom", "tuple", name=AXES)
+        for name in only:
+            self.document.add(record, "element", objtype="joint", objname=name)
 
     def follow(self, joint: str, reference: float, coordinate: str, function: Piecewise) -> None:
         """Write that a joint is a function of a coordinate, and report it."""
@@ -229,4 +259,5 @@ def write_bodies(document: Document, model: OsimModel, report: Report, limits: b
             writer.shown.add(name)
     writer.couplings()
     writer.functions()
+    writer.axes()
     return Skeleton(branches, drivers, inertias, writer.joints)
