@@ -159,6 +159,9 @@ def _contact(node: Node, name: str, known: Known, active: bool) -> Force:
     if node.tag == "SmoothSphereHalfSpaceForce":
         shapes = [socket(node, which).rsplit("/", 1)[-1] for which in ("sphere", "half_space")]
         parameters = {tag: node.number(tag, default=value) for tag, value in _SMOOTH.items()}
+    for tag, value in [*parameters.items(), *(item for each in by_shape.values() for item in each.items())]:
+        if value < 0.0:
+            raise node.error(f"{tag} must not be negative, not {value:g}")
     parameters = {**parameters, "transition_velocity": node.number("transition_velocity", default=0.01)}
     for shape in shapes:
         if shape not in known.shapes:

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "infinity": math.inf}
+LARGEST = 1e30  # magnitude of a number; powers of larger ones overflow
 _TRUE, _FALSE = {"true", "1"}, {"false", "0"}
 
 # Tags between a component and the one that owns it, which are no part of its path.
@@ -169,8 +170,10 @@ class Node:
                 value = sign * _NOT_FINITE[bare.lower()]
             else:
                 raise self.error(f"'{_short(word)}' is not a number")
-            if finite and not math.isfinite(value):
-                raise self.error(f"must be a finite number, not {word}")
+            if math.isnan(value) or (finite and not math.isfinite(value)):
+                raise self.error(f"must be a {'finite ' * finite}number, not {word}")
+            if finite and abs(value) > LARGEST:
+                raise self.error(f"{_short(word)} is larger than any number of a model")
             numbers.append(value)
         return numbers
 
