@@ -51,8 +51,7 @@ def read_force(node: Node, name: str, known: Known) -> Force:
         if element is None:
             raise node.error("has no path; add a <GeometryPath>")
         if element.tag != "GeometryPath":
-            node.note(f"its path is a {element.tag}, which cannot be read")
-            return OtherForce(name, node.tag)
+            return OtherForce(name, node.tag, f"its path is a {element.tag}, which mjwrap does not read")
         path = read_path(element, known.places, known.coordinate, known.wraps, known.coordinates)
         if is_muscle(node):
             return read_muscle(node, name, path, active)

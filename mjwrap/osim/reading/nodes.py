@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
 from mjwrap.osim.description.model import Note
+from mjwrap.osim.report import EXACT
 
 Array = NDArray[np.float64]
 
@@ -86,9 +87,10 @@ class Node:
         """Return the error that says what is wrong with this element."""
         return OsimError(f"{self.document.file}, line {self.line}: {self.label}: {text}")
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, outcome: str = EXACT) -> None:
         """Say something about this element in the report."""
-        self.document.notes.append(Note(self.label, text))
+        name = self.label.removeprefix(self.tag).strip().removeprefix("'").removesuffix("'")
+        self.document.notes.append(Note(self.tag, name, text, outcome))
 
     def __iter__(self) -> Iterator[Node]:
         return iter(self.children)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +24,7 @@ def read_obj(content: bytes) -> tuple[Array, NDArray[np.int64]]:
                 vertices.append([x, y, z])
             elif words[:1] == ["f"]:
                 corners = [_index(word, len(vertices)) for word in words[1:]]
-                faces += [(corners[0], b, c) for b, c in zip(corners[1:], corners[2:], strict=False)]
+                faces += [(corners[0], b, c) for b, c in itertools.pairwise(corners[1:])]
         except ValueError:
             raise MeshError(f"has a line that cannot be read, line {number}") from None
     return np.array(vertices).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
