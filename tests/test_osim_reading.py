@@ -167,7 +167,7 @@ def test_nested_frames_lead_to_their_body():
     shapes = {mesh.primitive: mesh.size for mesh in model.bodies[0].meshes}
     assert shapes == {"Brick": (1, 2, 3), "Sphere": (0.3,), "Cylinder": (0.1, 0.7), "Ellipsoid": (1, 2, 3)}
     assert model.bodies[0].meshes[0].opacity == 0.0
-    assert any(note.element == "Cone 'co'" for note in model.notes)
+    assert any((note.kind, note.name) == ("Cone", "co") for note in model.notes)
 
 
 def test_wraps_keep_their_range_and_method():
@@ -199,7 +199,7 @@ def test_contacts_bushings_and_what_is_only_named():
 def test_constraints_that_are_switched_off_are_noted():
     model = read_osim(model_path("own_version_4.osim"))
     assert model.constraints == ()
-    assert any(note.element == "WeldConstraint 'wc1'" and "switched off" in note.text for note in model.notes)
+    assert any((note.kind, note.name) == ("WeldConstraint", "wc1") and "switched off" in note.text for note in model.notes)
 
 
 def test_a_body_without_joint_moves_freely_under_opensims_names(tmp_path):

@@ -146,10 +146,11 @@ class HuntCrossley:
 
 @dataclass(frozen=True)
 class OtherForce:
-    """A force, controller or probe that is only named in the report."""
+    """A force, controller or probe that is only named in the report, and why."""
 
     name: str
     kind: str
+    text: str = "mjwrap does not import this class"
 
 
 Force = (

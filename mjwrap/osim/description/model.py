@@ -24,10 +24,12 @@ class Marker:
 
 @dataclass(frozen=True)
 class Note:
-    """Something that the reader left out or understood only in part: which element, and why."""
+    """Something that the reader says about an element: what it left out, understood in part, or did."""
 
-    element: str  # its class and name, for example "WrapObject 'hamstrings'"
+    kind: str  # its class in the file
+    name: str  # its own, or as "of Model 'leg'" where it has none
     text: str
+    outcome: str  # of the report: exact, approximated, left out
 
 
 @dataclass(frozen=True)

@@ -8,3 +8,4 @@ from mjwrap.osim.kinematics.poses import Pose as Pose
 from mjwrap.osim.kinematics.poses import body_poses as body_poses
 from mjwrap.osim.kinematics.poses import frame_pose as frame_pose
 from mjwrap.osim.kinematics.poses import joint_motion as joint_motion
+from mjwrap.osim.kinematics.poses import placing_joints as placing_joints

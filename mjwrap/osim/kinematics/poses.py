@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,10 +37,7 @@ def body_poses(model: OsimModel, values: Mapping[str, float]) -> dict[str, Pose]
     where the values fit.
     """
     poses = {GROUND: Pose(np.eye(3), np.zeros(3))}
-    waiting = list(model.joints)
-    while (found := _next(waiting, poses)) is not None:
-        joint, backward = found
-        waiting = [other for other in waiting if other is not joint]
+    for joint, backward in placing_joints(model.joints):
         motion = joint_motion(joint, values)
         near, far = (joint.child, joint.parent) if backward else (joint.parent, joint.child)
         across = motion.inverse() if backward else motion
@@ -48,13 +45,22 @@ def body_poses(model: OsimModel, values: Mapping[str, float]) -> dict[str, Pose]
     return poses
 
 
-def _next(waiting: list[Joint], poses: Mapping[str, Pose]) -> tuple[Joint, bool] | None:
-    """Return the next joint that places a body, and whether it leads from its child to its parent."""
+def placing_joints(joints: Sequence[Joint]) -> list[tuple[Joint, bool]]:
+    """Return the joints that place bodies, from ground on, each with whether it leads from its child to its parent."""
+    placed, found, waiting = {GROUND}, [], list(joints)
+    while (step := _next(waiting, placed)) is not None:
+        found.append(step)
+        waiting = [other for other in waiting if other is not step[0]]
+        placed |= {step[0].parent.body, step[0].child.body}
+    return found
+
+
+def _next(waiting: Sequence[Joint], placed: set[str]) -> tuple[Joint, bool] | None:
     for joint in waiting:
-        if joint.parent.body in poses and joint.child.body not in poses:
+        if joint.parent.body in placed and joint.child.body not in placed:
             return joint, False
     for joint in waiting:
-        if joint.child.body in poses and joint.parent.body not in poses:
+        if joint.child.body in placed and joint.parent.body not in placed:
             return joint, True
     return None
 

@@ -18,6 +18,7 @@ from mjwrap.osim.reading.forces import two_frames
 from mjwrap.osim.reading.frames import Places, offset, socket, unnamed
 from mjwrap.osim.reading.functions import read_property
 from mjwrap.osim.reading.nodes import Node
+from mjwrap.osim.report import LEFT_OUT
 
 CoordinateName = Callable[[Node, str], str]
 
@@ -25,11 +26,11 @@ CoordinateName = Callable[[Node, str], str]
 def read_constraint(node: Node, name: str, places: Places, coordinate: CoordinateName) -> Constraint | None:
     """Return a constraint; None, with a note, where it is switched off or of a class that is not known."""
     if node.flag("isDisabled", default=False) or not node.flag("isEnforced", default=True):
-        node.note("is switched off in the file")
+        node.note("is switched off in the file", LEFT_OUT)
         return None
     reader = _READERS.get(node.tag)
     if reader is None:
-        node.note(f"constraints of class {node.tag} cannot be read; classes: {', '.join(_READERS)}")
+        node.note(f"constraints of class {node.tag} cannot be read; classes: {', '.join(_READERS)}", LEFT_OUT)
         return None
     return reader(node, name, places, coordinate)
 

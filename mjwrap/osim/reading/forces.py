@@ -51,8 +51,7 @@ def read_force(node: Node, name: str, known: Known) -> Force:
         if element is None:
             raise node.error("has no path; add a <GeometryPath>")
         if element.tag != "GeometryPath":
-            node.note(f"its path is a {element.tag}, which cannot be read")
-            return OtherForce(name, node.tag)
+            return OtherForce(name, node.tag, f"its path is a {element.tag}, which mjwrap does not read")
         path = read_path(element, known.places, known.coordinate, known.wraps, known.coordinates)
         if is_muscle(node):
             return read_muscle(node, name, path, active)
@@ -159,6 +158,9 @@ def _contact(node: Node, name: str, known: Known, active: bool) -> Force:
     if node.tag == "SmoothSphereHalfSpaceForce":
         shapes = [socket(node, which).rsplit("/", 1)[-1] for which in ("sphere", "half_space")]
         parameters = {tag: node.number(tag, default=value) for tag, value in _SMOOTH.items()}
+    for tag, value in [*parameters.items(), *(item for each in by_shape.values() for item in each.items())]:
+        if value < 0.0:
+            raise node.error(f"{tag} must not be negative, not {value:g}")
     parameters = {**parameters, "transition_velocity": node.number("transition_velocity", default=0.01)}
     for shape in shapes:
         if shape not in known.shapes:

@@ -21,38 +21,38 @@ class Places:
     """The frames, stations and coordinates of a model, by path and by name."""
 
     model: Node
-    by_path: dict[str, Node] = field(default_factory=dict)
-    by_name: dict[str, Node] = field(default_factory=dict)
+    by_path: dict[str, list[Node]] = field(default_factory=dict)
+    by_name: dict[str, list[Node]] = field(default_factory=dict)
     bodies: dict[str, Node] = field(default_factory=dict)
     _frames: dict[int, Frame] = field(default_factory=dict)
     _open: list[Node] = field(default_factory=list)
 
     def add(self, node: Node) -> None:
-        """Make a frame, station or coordinate known; of several with one name the first is meant by the name."""
-        self.by_path.setdefault(node.path, node)
-        self.by_name.setdefault(node.name or node.tag.lower(), node)
+        """Make a frame, station or coordinate known; of several of a kind with one name its first is meant."""
+        self.by_path.setdefault(node.path, []).append(node)
+        self.by_name.setdefault(node.name or node.tag.lower(), []).append(node)
 
     def look_up(self, owner: Node, text: str, kinds: set[str], what: str) -> Node:
         """Return the element that a path or name in an element means."""
-        found = self._by_path(owner, text)
-        if found is None or found.tag not in kinds:
-            name = text.rstrip("/").rsplit("/", 1)[-1]
-            found = self.by_name.get(name)
-        if found is None or found.tag not in kinds:
-            known = sorted({node.name for node in self.by_path.values() if node.tag in kinds and node.name})
-            raise owner.error(f"{what} '{text}' does not exist; there are: {', '.join(known) or 'none'}")
-        return found
+        name = text.rstrip("/").rsplit("/", 1)[-1]
+        for node in [*self._by_path(owner, text), *self.by_name.get(name, [])]:
+            if node.tag in kinds:
+                return node
+        known = sorted(
+            {n.name for nodes in self.by_path.values() for n in nodes if n.tag in kinds and n.name}
+        )
+        raise owner.error(f"{what} '{text}' does not exist; there are: {', '.join(known) or 'none'}")
 
-    def _by_path(self, owner: Node, text: str) -> Node | None:
+    def _by_path(self, owner: Node, text: str) -> list[Node]:
         if text.startswith("/"):
             path = posixpath.normpath(text)
-            found = self.by_path.get(path)
-            if found is None and path.startswith(f"/{self.model.name}/"):
-                found = self.by_path.get(path[len(self.model.name) + 1 :])
+            found = self.by_path.get(path, [])
+            if not found and path.startswith(f"/{self.model.name}/"):
+                found = self.by_path.get(path[len(self.model.name) + 1 :], [])
             return found
         if not text or posixpath.normpath(text).strip("/") == "":
-            return None
-        return self.by_path.get(posixpath.normpath(posixpath.join(owner.path, text)))
+            return []
+        return self.by_path.get(posixpath.normpath(posixpath.join(owner.path, text)), [])
 
     def frame(self, owner: Node, text: str) -> Frame:
         """Return the frame that a path or name in an element means."""

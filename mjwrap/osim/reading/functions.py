@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mjwrap.osim.description.functions import Piecewise, constant, linear
 from mjwrap.osim.reading.nodes import Node
 from mjwrap.osim.reading.splines import natural_spline, simm_spline
+from mjwrap.osim.report import APPROXIMATED
 
 Array = NDArray[np.float64]
 
@@ -151,7 +152,8 @@ def _sine(node: Node) -> Piecewise:
     rounding = np.finfo(np.float64).eps * (abs(omega) * SINE_REACH + abs(phase) + 2.0)
     error = abs(amplitude) * float(rounding + half ** (SINE_DEGREE + 1) / math.factorial(SINE_DEGREE + 1))
     node.note(
-        f"is kept as {pieces} polynomials, {error:.1e} from the sine while its variable lies within ±{SINE_REACH:g}"
+        f"is kept as {pieces} polynomials, {error:.1e} from the sine while its variable lies within ±{SINE_REACH:g}",
+        APPROXIMATED,
     )
     return Piecewise(edges[1:-1].copy(), origins, coefficients, node.tag, error)
 

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
 from mjwrap.osim.description.model import Note
+from mjwrap.osim.report import EXACT
 
 Array = NDArray[np.float64]
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "infinity": math.inf}
+LARGEST = 1e30  # magnitude of a number; powers of larger ones overflow
 _TRUE, _FALSE = {"true", "1"}, {"false", "0"}
 
 # Tags between a component and the one that owns it, which are no part of its path.
@@ -85,9 +87,10 @@ class Node:
         """Return the error that says what is wrong with this element."""
         return OsimError(f"{self.document.file}, line {self.line}: {self.label}: {text}")
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, outcome: str = EXACT) -> None:
         """Say something about this element in the report."""
-        self.document.notes.append(Note(self.label, text))
+        name = self.label.removeprefix(self.tag).strip().removeprefix("'").removesuffix("'")
+        self.document.notes.append(Note(self.tag, name, text, outcome))
 
     def __iter__(self) -> Iterator[Node]:
         return iter(self.children)
@@ -169,8 +172,10 @@ class Node:
                 value = sign * _NOT_FINITE[bare.lower()]
             else:
                 raise self.error(f"'{_short(word)}' is not a number")
-            if finite and not math.isfinite(value):
-                raise self.error(f"must be a finite number, not {word}")
+            if math.isnan(value) or (finite and not math.isfinite(value)):
+                raise self.error(f"must be a {'finite ' * finite}number, not {word}")
+            if finite and abs(value) > LARGEST:
+                raise self.error(f"{_short(word)} is larger than any number of a model")
             numbers.append(value)
         return numbers
 

@@ -11,6 +11,7 @@ from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading.frames import FRAMES, Places, offset, socket
 from mjwrap.osim.reading.functions import read_property
 from mjwrap.osim.reading.nodes import Node
+from mjwrap.osim.report import APPROXIMATED
 
 QUADRANTS = ("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z")
 DIMENSIONS: dict[str, tuple[tuple[str, int, float], ...]] = {
@@ -86,7 +87,10 @@ def read_path(
         raise node.error(f"has {len(points)} points; a path needs two")
     for which, point in (("first", points[0]), ("last", points[-1])):
         if point.condition is not None:
-            node.note(f"its {which} point is conditional")
+            node.note(
+                f"its {which} point is conditional: it always belongs to the path, where OpenSim can lose an end",
+                APPROXIMATED,
+            )
     return Path(
         tuple(points),
         tuple(_wrap(wrap, len(points), wraps) for wrap in node.objects("PathWrapSet")),

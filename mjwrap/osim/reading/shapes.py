@@ -11,6 +11,7 @@ from mjwrap.osim.description.forces import ContactShape
 from mjwrap.osim.description.rotations import body_fixed_xyz
 from mjwrap.osim.reading.frames import FRAMES, Places, offset, socket, unnamed
 from mjwrap.osim.reading.nodes import Array, Node
+from mjwrap.osim.report import LEFT_OUT
 
 PRIMITIVES: dict[str, tuple[tuple[str, int, tuple[float, ...]], ...]] = {
     "Brick": (("half_lengths", 3, (0.1, 0.2, 0.3)),),
@@ -98,12 +99,12 @@ def _attached(node: Node, places: Places) -> Mesh | None:
     if node.tag in ("Mesh", "TransformedMesh"):
         file = node.string("mesh_file", default="")
         if not file:
-            node.note("names no mesh_file")
+            node.note("names no mesh_file", LEFT_OUT)
             return None
         return Mesh(node.name, frame, file, scale, color=color, opacity=opacity)
     if node.tag not in PRIMITIVES:
         if node.tag != "FrameGeometry":
-            node.note(f"shapes of class {node.tag} are not drawn")
+            node.note(f"shapes of class {node.tag} are not drawn", LEFT_OUT)
         return None
     size: list[float] = []
     for tag, count, default in PRIMITIVES[node.tag]:
@@ -153,7 +154,9 @@ def _listed(visible: Node, places: Places, file: str) -> Mesh | None:
 def read_contact_shape(node: Node, places: Places) -> ContactShape | None:
     """Return a contact shape; None, with a note, for a class that is not known."""
     if node.tag not in _CONTACTS:
-        node.note(f"contact geometry of class {node.tag} cannot be read; classes: {', '.join(_CONTACTS)}")
+        node.note(
+            f"contact geometry of class {node.tag} cannot be read; classes: {', '.join(_CONTACTS)}", LEFT_OUT
+        )
         return None
     frame: Frame = offset(
         places.frame(node, socket(node, "frame", "body_name")),

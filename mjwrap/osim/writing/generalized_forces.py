@@ -211,7 +211,7 @@ def write_generalized_forces(
     writer = _Writer(document, report, skeleton)
     for force in model.forces:
         if isinstance(force, OtherForce):
-            report.add(force.kind, force.name, LEFT_OUT, "mjwrap does not import this class")
+            report.add(force.kind, force.name, LEFT_OUT, force.text)
             continue
         written = {
             CoordinateActuator: writer.actuator,

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from mjwrap.errors import ModelError
+from mjwrap.mjcf.parameters import law_arguments
+from mjwrap.muscles.activation import ActivationDynamics
+from mjwrap.muscles.laws import LAWS
 from mjwrap.muscles.millard_curves import PARAMETERS
 from mjwrap.osim.description.forces import Muscle
 
@@ -71,6 +75,18 @@ def law_of(muscle: Muscle) -> WrittenLaw:
         _take(law, {MINIMUM: MINIMUM}, given)
     _dynamics(law, muscle)
     return law
+
+
+def refusal(law: WrittenLaw) -> str:
+    """Return why mjwrap does not accept the numbers of a law, or an empty string."""
+    tendon = law.words.get("tendon_model")
+    up, down = law.numbers.get("activation_time_constants", (None, None))
+    try:
+        LAWS[law.name](**law_arguments(law.numbers), **({} if tendon is None else {"tendon": tendon}))
+        ActivationDynamics(law.words.get("activation_dynamics", "zajac"), up, down)
+    except ModelError as error:
+        return str(error)
+    return ""
 
 
 def _take(law: WrittenLaw, names: Mapping[str, str], given: Mapping[str, float]) -> None:

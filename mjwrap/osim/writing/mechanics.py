@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjwrap.osim.description.model import OsimModel
-from mjwrap.osim.report import Report
+from mjwrap.osim.report import LEFT_OUT, Report
 from mjwrap.osim.writing.constraints import write_constraints
 from mjwrap.osim.writing.contacts import write_contacts
 from mjwrap.osim.writing.document import Document
@@ -26,6 +26,11 @@ def write_mechanics(
     folders: where mesh files are searched, in this order. limits: whether clamped coordinates get limits.
     """
     write_options(document, model)
+    for note in model.notes:
+        kind = note.kind if note.outcome == LEFT_OUT else f"note on {note.kind}"  # which has an entry of its own
+        report.add(kind, note.name, note.outcome, note.text)
+    for other in model.others:
+        report.add(other.kind, other.name, LEFT_OUT, other.text)
     skeleton = write_bodies(document, model, report, limits)
     write_constraints(document, model, report, skeleton)
     report_inertias(document, report, skeleton)

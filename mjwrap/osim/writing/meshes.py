@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mjwrap.osim.description.bodies import Mesh
 from mjwrap.osim.description.functions import Array
@@ -15,13 +14,14 @@ from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.report import EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.motions import placed, turned
+from mjwrap.osim.writing.obj import read_obj
 from mjwrap.osim.writing.rotations import quaternion
+from mjwrap.osim.writing.stl import binary_stl, check_scaled, read_stl, triangles
 from mjwrap.osim.writing.unique_names import UniqueNames, plain_name
 from mjwrap.osim.writing.vtp import MeshError, read_vtp
 
-MOST_FACES = 200_000  # that MuJoCo reads from one file
+READERS = {".vtp": read_vtp, ".stl": read_stl, ".obj": read_obj}
 DRAWN = {"contype": 0, "conaffinity": 0, "group": 1, "mass": 0}
-FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 
 
 class MeshFiles:
@@ -31,6 +31,7 @@ class MeshFiles:
         self.document, self.folders = document, folders
         self.files: dict[Path, str | MeshError] = {}  # name of the asset, or why there is none
         self.meshes: dict[tuple[str, tuple[float, ...]], str] = {}
+        self.corners: dict[str, Array] = {}  # of the triangles of an asset (m, 3, 3)
 
     def geom(self, mesh: Mesh) -> dict[str, Any]:
         """Return the attributes of a geom of a mesh file."""
@@ -47,6 +48,7 @@ class MeshFiles:
         if isinstance(asset, MeshError):
             raise asset
         if (asset, scale) not in self.meshes:
+            check_scaled(self.corners[asset], scale)
             name = plain_name(Path(asset).stem)
             unique = UniqueNames(self.document, "mesh", section="asset").new(name)
             self.document.add("asset", "mesh", name=unique, file=asset, inertia="shell",
@@ -76,63 +78,17 @@ class MeshFiles:
         except OSError as error:
             raise MeshError(f"cannot be read: {error.strerror}") from None
         suffix = path.suffix.lower()
-        if suffix == ".vtp":
-            content, suffix = _stl(*read_vtp(content)), ".stl"
-        elif suffix == ".stl":
-            content = _checked_stl(content)
-        elif suffix == ".obj":
-            _check_obj(content)
-        else:
+        if suffix not in READERS:
             raise MeshError("has a format that mjwrap does not read; it reads .vtp, .stl and .obj")
-        name = plain_name(path.stem) + suffix
+        corners = triangles(*READERS[suffix](content))
+        name = f"{plain_name(path.stem)}.stl"
         count = 1
         while name in self.document.assets:
             count += 1
-            name = f"{plain_name(path.stem)}_{count}{suffix}"
-        self.document.assets[name] = content
+            name = f"{plain_name(path.stem)}_{count}.stl"
+        self.document.assets[name] = binary_stl(corners)
+        self.corners[name] = corners
         return name
-
-
-def _stl(vertices: Array, faces: NDArray[np.int64]) -> bytes:
-    """Return triangles as a binary STL file; those without area are left out."""
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(normals, axis=1)
-    kept = area > 0.0
-    if not kept.any() or len(np.unique(faces[kept])) < 4:
-        raise MeshError("has no surface")
-    if int(kept.sum()) > MOST_FACES:
-        raise MeshError(f"has {int(kept.sum())} triangles; MuJoCo reads {MOST_FACES}")
-    records = np.zeros(int(kept.sum()), FACE)
-    records["normal"] = normals[kept] / area[kept, None]
-    records["corners"] = corners[kept]
-    return b"mjwrap".ljust(80) + np.uint32(len(records)).tobytes() + records.tobytes()
-
-
-def _checked_stl(content: bytes) -> bytes:
-    """Return an STL file as a binary one."""
-    if len(content) >= 84 and len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
-        corners = np.frombuffer(content[84:], FACE)["corners"].astype(np.float64)
-    else:
-        rows = [
-            line.split()[1:4]
-            for line in content.decode("latin-1").splitlines()
-            if line.split()[:1] == ["vertex"]
-        ]
-        try:
-            corners = np.array(rows, dtype=np.float64).reshape(-1, 3, 3)
-        except ValueError:
-            raise MeshError("is neither a binary nor a text STL file") from None
-    if not len(corners) or not np.isfinite(corners).all():
-        raise MeshError("has no triangles, or has numbers that are not finite")
-    vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return _stl(vertices, faces.reshape(-1, 3))
-
-
-def _check_obj(content: bytes) -> None:
-    lines = content.decode("latin-1").splitlines()
-    if sum(line.startswith("v ") for line in lines) < 4 or not any(line.startswith("f ") for line in lines):
-        raise MeshError("has no surface")
 
 
 def _primitive(mesh: Mesh) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathSpring
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.document import Document
-from mjwrap.osim.writing.laws import WrittenLaw, law_of
+from mjwrap.osim.writing.laws import WrittenLaw, law_of, refusal
 from mjwrap.osim.writing.piece_algebra import flattened
 from mjwrap.osim.writing.routes import Route, RouteWriter
 from mjwrap.osim.writing.unique_names import UniqueNames
@@ -39,30 +39,18 @@ class MuscleWriter:
         if not pull.active:
             self._report.add(kind, pull.name, LEFT_OUT, DISABLED)
             return
-        fault = _fault(pull)
+        law = _law(pull)
+        fault = refusal(law)
         route = None if fault else self._routes.route(pull.name, pull.path)
         if route is None:
             self._report.add(kind, pull.name, LEFT_OUT, fault or "its path is left out")
             return
-        match pull:
-            case Muscle():
-                law = law_of(pull)
-                self._driven(pull.name, route, law, pull.control_range)
-                if law.own_states:
-                    self.default_activations += [float(pull.parameters.get("default_activation", 0.0)), 0.0]
-            case PathActuator():
-                law = WrittenLaw("path_actuator", {"optimal_force": [pull.optimal_force]}, own_states=False)
-                self._driven(pull.name, route, law, pull.control_range)
-            case Ligament():
-                law = WrittenLaw("ligament", {
-                    "resting_length": [pull.resting_length], "pcsa_force": [pull.pcsa_force],
-                    "ligament_curve": flattened(pull.curve)}, own_states=False)  # fmt: skip
-                self._passive(pull.name, route, law)
-            case PathSpring():
-                law = WrittenLaw("path_spring", {
-                    "resting_length": [pull.resting_length], "stiffness": [pull.stiffness],
-                    "dissipation": [pull.dissipation]}, own_states=False)  # fmt: skip
-                self._passive(pull.name, route, law)
+        if isinstance(pull, Muscle | PathActuator):
+            self._driven(pull.name, route, law, pull.control_range)
+        else:
+            self._passive(pull.name, route, law)
+        if isinstance(pull, Muscle) and law.own_states:
+            self.default_activations += [float(pull.parameters.get("default_activation", 0.0)), 0.0]
         outcome = APPROXIMATED if law.remarks else EXACT
         self._report.add(kind, pull.name, outcome, "; ".join([f"law {law.name}", *law.remarks]))
 
@@ -100,17 +88,17 @@ class MuscleWriter:
             self._document.add(record, "element", **element)
 
 
-def _fault(pull: Pull) -> str:
-    """Return why a force along a path cannot be written, or nothing."""
-    if isinstance(pull, Muscle):
-        for key in ("max_isometric_force", "optimal_fiber_length"):
-            value = pull.parameters.get(key, 0.0)
-            if not (math.isfinite(value) and value > 0.0):
-                return f"its {key} is {value:g}"
-    if isinstance(pull, PathSpring) and not pull.stiffness > 0.0:
-        return f"its stiffness is {pull.stiffness:g}"
-    if isinstance(pull, Ligament) and not (pull.pcsa_force > 0.0 and pull.resting_length > 0.0):
-        return f"its pcsa_force is {pull.pcsa_force:g} and its resting_length {pull.resting_length:g}"
-    if isinstance(pull, PathActuator) and not pull.optimal_force > 0.0:
-        return f"its optimal_force is {pull.optimal_force:g}"
-    return ""
+def _law(pull: Pull) -> WrittenLaw:
+    """Return the law of a force along a path."""
+    match pull:
+        case Muscle():
+            return law_of(pull)
+        case PathActuator():
+            return WrittenLaw("path_actuator", {"optimal_force": [pull.optimal_force]}, own_states=False)
+        case Ligament():
+            curve = flattened(pull.curve)
+            numbers = {"resting_length": [pull.resting_length], "pcsa_force": [pull.pcsa_force]}
+            return WrittenLaw("ligament", {**numbers, "ligament_curve": curve}, own_states=False)
+        case PathSpring():
+            numbers = {key: [getattr(pull, key)] for key in ("resting_length", "stiffness", "dissipation")}
+            return WrittenLaw("path_spring", numbers, own_states=False)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from mjwrap.osim.description.paths import Path
+from mjwrap.osim.description.paths import Path, PathWrap
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.segment_scan import Sample
 from mjwrap.osim.writing.segments import Seat, seat_wraps
@@ -49,12 +49,16 @@ class RouteWriter:
 
     def _seats(self, owner: str, path: Path) -> list[Seat]:
         kept: list[Seat] = []
+        used: list[PathWrap] = []
         for wrap in path.wraps:
+            name = f"{owner}/{wrap.object}"
             if wrap.object not in self._wraps:
-                self._report.add(
-                    "PathWrap", f"{owner}/{wrap.object}", LEFT_OUT, "its wrap object is left out"
-                )
-        for seat in seat_wraps(path, self._wraps, self._poses):
+                self._report.add("PathWrap", name, LEFT_OUT, "its wrap object is left out")
+            elif not wrap.first < wrap.last:
+                self._report.add("PathWrap", name, LEFT_OUT, "its range has no segment, so it never acts")
+            else:
+                used.append(wrap)
+        for seat in seat_wraps(replace(path, wraps=tuple(used)), self._wraps, self._poses):
             name = f"{owner}/{seat.wrap}"
             if not self._wraps[seat.wrap].wrap.active:
                 self._report.add("PathWrap", name, LEFT_OUT, "its wrap object is not active in the file")

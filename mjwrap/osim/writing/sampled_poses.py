@@ -18,7 +18,7 @@ from mjwrap.osim.description.bodies import (
     WeldConstraint,
 )
 from mjwrap.osim.description.model import OsimModel
-from mjwrap.osim.kinematics import Pose, body_poses, complete, frame_pose
+from mjwrap.osim.kinematics import Pose, body_poses, complete, frame_pose, placing_joints
 from mjwrap.osim.writing.segment_scan import Sample
 
 Array = NDArray[np.float64]
@@ -59,7 +59,13 @@ def _drawn(coordinate: Coordinate, random: np.random.Generator) -> float:
 
 def _loops(model: OsimModel) -> OsimModel:
     """Return the model with only the joints that carry bodies of constraints."""
-    carriers = {joint.child.body: joint for joint in model.joints}
+    carriers = {
+        (joint.parent if backward else joint.child).body: (
+            joint,
+            (joint.child if backward else joint.parent).body,
+        )
+        for joint, backward in placing_joints(model.joints)
+    }
     waiting = [
         frame.body
         for constraint in model.constraints
@@ -69,10 +75,11 @@ def _loops(model: OsimModel) -> OsimModel:
     ]
     needed: set[str] = set()
     while waiting:
-        joint = carriers.get(waiting.pop())
-        if joint is not None and joint.name not in needed:
+        body = waiting.pop()
+        if body in carriers and carriers[body][0].name not in needed:
+            joint, nearer = carriers[body]
             needed.add(joint.name)
-            waiting.append(joint.parent.body)
+            waiting.append(nearer)
     return replace(model, joints=tuple(joint for joint in model.joints if joint.name in needed))
 
 

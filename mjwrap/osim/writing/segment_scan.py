@@ -47,8 +47,9 @@ class Act(NamedTuple):
 
 
 def active_points(path: Path, sample: Sample) -> list[int]:
-    """Return the indices of the points that belong to a path at a pose."""
-    return [k for k, point in enumerate(path.points) if holds(point.condition, sample.values)]
+    """Return the indices of the points that belong to a path at a pose, as written: always with its ends."""
+    ends = 0, len(path.points) - 1
+    return [k for k, point in enumerate(path.points) if k in ends or holds(point.condition, sample.values)]
 
 
 def acts_of(path: Path, wrap: PathWrap, written: WrittenWrap, sample: Sample) -> list[Act]:
@@ -82,7 +83,7 @@ def act_between(written: WrittenWrap, first: int, last: int, start: Array, end: 
     hit = depth < 0.0
     nothing = Act(first, last, hit, False, 0.0, along, inside, False)
     side = side_point(wrap) if written.side else None
-    if inside or not (hit or (side is not None and wrap.kind == "WrapCylinder")):
+    if inside or np.array_equal(start, end) or not (hit or (side is not None and wrap.kind == "WrapCylinder")):
         return nothing
     hint = None if side is None else tuple(side)
     solution = solve_path(start, end, [Obstacle(written.surface, hint=hint)])

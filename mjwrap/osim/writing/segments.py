@@ -43,10 +43,8 @@ class Seat:
 
 
 def seat_wraps(path: Path, wraps: Mapping[str, WrittenWrap], poses: Sequence[Sample]) -> list[Seat]:
-    """Return where every wrap of a path lies, in the file's order; those that are left out are missing."""
-    return [
-        _seat(path, k, wraps[wrap.object], poses) for k, wrap in enumerate(path.wraps) if wrap.object in wraps
-    ]
+    """Return where every wrap of a path lies, in the file's order; every wrap has a segment."""
+    return [_seat(path, k, wraps[wrap.object], poses) for k, wrap in enumerate(path.wraps)]
 
 
 def _seat(path: Path, index: int, written: WrittenWrap, poses: Sequence[Sample]) -> Seat:

@@ -38,25 +38,31 @@ def read_vtp(content: bytes) -> tuple[Array, NDArray[np.int64]]:
     triangles: list[NDArray[np.int64]] = []
     count = 0
     for piece in root.iter("Piece"):
-        own = reader.of(piece.find("Points"), "").reshape(-1, 3)
+        own = reader.of(piece.find("Points"), "")
+        if own.size % 3:
+            raise MeshError(f"has {own.size} coordinates of points, which is not a multiple of 3")
+        own = own.reshape(-1, 3)
         for tag, cut in (("Polys", _fans), ("Strips", _strips)):
             cells = piece.find(tag)
             if cells is not None and len(cells):
-                indices = reader.of(cells, "connectivity").astype(np.int64)
-                ends = reader.of(cells, "offsets").astype(np.int64)
+                indices, ends = (_whole(reader.of(cells, name)) for name in ("connectivity", "offsets"))
                 triangles.append(cut(indices, ends) + count)
         points.append(own)
         count += len(own)
     if not points or not triangles or not sum(map(len, triangles)):
         raise MeshError("has no polygons")
     vertices, faces = np.concatenate(points), np.concatenate(triangles)
-    if faces.min() < 0 or faces.max() >= len(vertices) or not np.isfinite(vertices).all():
-        raise MeshError("names points that it does not have")
     return vertices, faces
 
 
+def _whole(numbers: Array) -> NDArray[np.int64]:
+    if not (np.abs(numbers) < 2.0**31).all():
+        raise MeshError("has indices that are no numbers of points")
+    return numbers.astype(np.int64)
+
+
 def _fans(indices: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:
-    starts = np.concatenate([[0], ends[:-1]])
+    starts = np.concatenate([[0], ends])[:-1]
     parts = [np.zeros((0, 3), dtype=np.int64)]
     for start, end in zip(starts, ends, strict=True):
         cell = indices[start:end]
@@ -66,7 +72,7 @@ def _fans(indices: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int
 
 
 def _strips(indices: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:
-    starts = np.concatenate([[0], ends[:-1]])
+    starts = np.concatenate([[0], ends])[:-1]
     rows = []
     for start, end in zip(starts, ends, strict=True):
         cell = indices[start:end]
