@@ -18,6 +18,18 @@ def counted_paths(total: int, cables: int, tendons: int = 0) -> str:
     return " and ".join(words) or counted(0, "muscle")
 
 
+def noun(kinds: Iterable[str], several: bool = False) -> str:
+    """Return the word for things of these kinds, such as "muscle or cable" or, for several, "muscles and cables"."""
+    known = set(kinds)
+    found = [kind for kind in ("muscle", "cable", "tendon") if kind in known] or ["muscle"]
+    return " and ".join(f"{kind}s" for kind in found) if several else " or ".join(found)
+
+
+def few(names: Sequence[str], most: int = 6) -> str:
+    """Return names for a message, the first of many and the number of the others."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return " (did you mean ...?)" with at most three known names like a wrong one, the best first, or an empty text.
 

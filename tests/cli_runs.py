@@ -42,6 +42,11 @@ ENTERS = """
 </mujoco>
 """
 
+COMPILING = (
+    "mjwrap: compiling its kernels",
+    "mjwrap: kernels compiled so far",
+)  # the second one on a slow machine
+
 
 class Ran(NamedTuple):
     """What a command left: exit code, standard output and error."""
@@ -89,8 +94,8 @@ def finish(process: "subprocess.Popen[str]") -> Ran:
 
 
 def said(ran: Ran) -> list[str]:
-    """Return the lines of standard error, without the one that says that kernels are compiled."""
-    return [line for line in ran.err.splitlines() if "compiling its kernels" not in line]
+    """Return the lines of standard error, without those that say that kernels are compiled, and how many by now."""
+    return [line for line in ran.err.splitlines() if not line.startswith(COMPILING)]
 
 
 def rows_of(path: Path) -> list[dict[str, float]]:

@@ -210,7 +210,7 @@ def test_a_comparison_has_cables_and_bare_tendons() -> None:
 def test_a_comparison_of_motions_drives_the_cables() -> None:
     """Where the paths are MuJoCo's, both motions are; the finger's are not."""
     model = model_of(CABLES)
-    moved = compare_motion(model, ["sine:0.3,2,0.7"], 0.3)
+    moved = compare_motion(model, ["sine:0.2,2,0.7"], 0.3)
     assert np.abs(moved.mjwrap[-1] - moved.mjwrap[0]).max() > 0.01
     assert np.abs(moved.difference).max() < 1e-10
     finger = compare_motion(mujoco.MjModel.from_xml_path(FINGER), PULL, 0.1)
@@ -246,6 +246,34 @@ def test_inspect_lists_the_cables(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "findings: 0" in ran.out
 
 
+def test_compare_calls_cables_and_tendons_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The keys of the JSON file stay."""
+    file, page, values = tmp_path / "robot.xml", tmp_path / "r.html", tmp_path / "r.json"
+    file.write_text(BARE)
+    options = (file, "--samples", 5, "--bases", 0, "--duration", 0, "--report", page, "--json", values)
+    for given, counted, noun, nouns in (
+        ((), "1 muscle and 4 cables", "muscle or cable", "muscles and cables"),
+        (("--muscles", "winch", "leash"), "2 cables", "cable", "cables"),
+        (("--tendons", "--muscles", "spring"), "1 tendon without an actuator", "tendon", "tendons"),
+        (("--muscles", "flexor"), "1 muscle", "muscle", "muscles"),
+    ):
+        ran = run_here("compare", capsys, *options, *given)
+        assert ran.code == 0, ran.err
+        assert ran.out.startswith(f"{file}: {counted} at ")
+        assert ran.out.splitlines()[1].startswith(f"{noun}  ")
+        text = page.read_text()
+        for part in (
+            f"<h2>All {nouns}</h2>",
+            f"<h2>Each {noun}</h2>",
+            f"{nouns} compared at",
+            f'<th class="text">{noun}</th>',
+        ):
+            assert part in text
+        assert "muscles" in json.loads(values.read_text())
+    ran = run_here("compare", capsys, file, "--muscles", "wench")
+    assert "no muscle or cable 'wench' (did you mean 'winch'?); muscles and cables: winch" in ran.err
+
+
 def test_what_stays_with_mujoco_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "robot.xml"
     file.write_text(CABLES)
@@ -272,7 +300,7 @@ def test_an_installed_model_names_its_native_cables() -> None:
 COMMANDS = {
     "inspect": ["--quick"],
     "check": ["--poses", "1", "--samples", "3"],
-    "compare": ["--samples", "3", "--bases", "0", "--duration", "0.02"],
+    "compare": ["--samples", "3", "--bases", "0", "--duration", "0.02", "--excitation", "winch=constant:1"],
     "run": ["--duration", "0.02"],
     "plot": ["--joint", "#2", "--range", "-30deg,30deg", "--muscle", "*", "--samples", "3", "--csv"],
 }
@@ -310,7 +338,7 @@ def test_a_saved_installed_model_runs_in_every_mode(
 ) -> None:
     """And moves as it did before it was saved; an MJB keeps its own mode of the plugin, and says so."""
     table, native = tmp_path / "t.csv", tmp_path / "native.csv"
-    options = ["--duration", 0.05, "--excitation", "sine:0.3,2,0.7", "--mode", mode]
+    options = ["--duration", 0.05, "--excitation", "sine:0.2,2,0.7", "--mode", mode]
     ran = run_here("run", capsys, saved[name], *options, "--csv", table)
     if name.endswith(".mjb") and mode != "python" and not name.startswith(mode):
         assert ran.code == 2

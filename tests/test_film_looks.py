@@ -15,7 +15,7 @@ from test_video import CORD, opengl  # noqa: F401  (skips where nothing can be d
 import mjwrap as mw
 from mjwrap.plugin import Muscles
 from mjwrap.video.background import NAMED
-from mjwrap.video.muscle_looks import PALETTE
+from mjwrap.video.muscle_looks import PALETTE, MuscleLooks
 
 pytest.importorskip("PIL.Image", reason="legends need Pillow")
 SIZE: dict[str, Any] = {"width": 160, "height": 120}
@@ -53,6 +53,12 @@ def elbow() -> mujoco.MjData:
 def share(picture: Any, color: Any, tolerance: int = 3) -> float:
     """The share of pixels that have a colour."""
     return float((np.abs(picture - np.asarray(color)).max(axis=-1) <= tolerance).mean())
+
+
+def near(picture: Any, color: Any) -> int:
+    """The number of pixels that have a hue, however bright."""
+    hue = picture / np.maximum(picture.max(axis=-1, keepdims=True), 1)
+    return int((np.abs(hue - np.asarray(color) / max(color)).max(axis=-1) < 0.08).sum())
 
 
 SKY = '<asset><texture type="skybox" builtin="flat" rgb1="0 .4 0" width="8" height="8"/></asset><worldbody>'
@@ -100,10 +106,6 @@ def test_a_room_and_the_texture_of_a_floor_give_way_to_the_background(tmp_path: 
 
 
 def test_muscles_of_one_look_are_told_apart_and_named(elbow: mujoco.MjData, tmp_path: Path) -> None:
-    def near(picture: Any, color: Any) -> int:
-        hue = picture / np.maximum(picture.max(axis=-1, keepdims=True), 1)
-        return int((np.abs(hue - np.asarray(color) / max(color)).max(axis=-1) < 0.08).sum())
-
     size = (640, 480)
     apart = frame(elbow, tmp_path, size=size, legend=False)
     alike = frame(elbow, tmp_path, size=size, legend=False, colors="model")
@@ -135,6 +137,31 @@ def test_a_model_that_tells_its_muscles_apart_keeps_its_colours(tmp_path: Path) 
     data = forward(mw.install(spec_of(text)))
     np.testing.assert_array_equal(frame(data, tmp_path), frame(data, tmp_path, colors="model", legend=False))
     assert (frame(data, tmp_path) != frame(data, tmp_path, colors="muscle", legend=False)).any()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_path_without_a_tendon_has_a_colour_and_a_name_where_it_can_be_told(
+    count: int, tmp_path: Path
+) -> None:
+    """The tendons beside it keep theirs. A scene does not say which of several such paths a piece belongs to."""
+    ties = "".join(
+        f'<numeric name="tie{i}_optimal_force" data="1"/><tuple name="mjwrap_tie{i}">'
+        '<element objtype="site" objname="a"/><element objtype="site" objname="c"/>'
+        f'<element objtype="numeric" objname="tie{i}_optimal_force"/></tuple>'
+        for i in range(count)
+    )
+    text = CORD.replace('rgba="1 0 0 1" width="0.01"', 'width="0.02"')
+    text = text.replace(
+        '<body pos="0.2 0 -0.1">', '<body pos="0.2 0 -0.1"><site name="c" pos="-.4 0 0" rgba="0 0 0 0"/>'
+    )
+    data = forward(mw.install(spec_of(text.replace("</mujoco>", f"<custom>{ties}</custom></mujoco>"))))
+    looks = MuscleLooks(data, None, None, dark=False)
+    names = [name for name, *_ in looks.legend()]
+    assert names == (["cord", "tie0"] if count == 1 else ["cord"])
+    seen = frame(data, tmp_path, size=(320, 240), legend=False)
+    colors = dict(zip(list(Muscles(data).names), PALETTE, strict=False))
+    assert near(seen, colors["cord"]) > 20
+    assert (near(seen, colors["tie0"]) > 20) == (count == 1)
 
 
 def test_activation_colours_a_path(tmp_path: Path) -> None:
@@ -262,3 +289,41 @@ def test_the_command_passes_the_look_on(tmp_path: Path, capsys: pytest.CaptureFi
         ran = run_here("run", capsys, model, "--duration", 0.02, *option)
         assert ran.code == 2
         assert "needs a film: add --video" in ran.err
+
+
+@pytest.mark.parametrize("camera", [None, "muscles"])
+@pytest.mark.parametrize("gravity", ["0 -9.81 0", "0 0 -9.81", "9.81 0 0", "0 0 0"])
+def test_up_is_against_gravity(gravity: str, camera: str | None, tmp_path: Path) -> None:
+    """A rod along gravity stands upright in the film, its red end above its blue one."""
+    up = -np.array([float(x) for x in gravity.split()])
+    up = up / np.linalg.norm(up) if up.any() else np.array([0.0, 0.0, 1.0])
+    ends = [" ".join(f"{x:g}" for x in share * up) for share in (-0.5, 0.0, 0.5)]
+    rods = "".join(
+        f'<geom type="capsule" fromto="{a} {b}" size="0.03" rgba="{rgba}" contype="0" conaffinity="0"/>'
+        for a, b, rgba in ((ends[0], ends[1], "0 0 1 1"), (ends[1], ends[2], "1 0 0 1"))
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="{gravity}"/><worldbody>{rods}</worldbody></mujoco>'
+    )
+    with mw.Video(model, tmp_path / "film.gif", width=80, height=80, camera=camera) as video:
+        data = forward(model)
+        video.log(data)
+        seen = video._picture(data, video._camera).astype(int)  # type: ignore[arg-type]
+    red = np.argwhere((seen[..., 0] > 100) & (seen[..., 2] < 60)).mean(axis=0)
+    blue = np.argwhere((seen[..., 2] > 100) & (seen[..., 0] < 60)).mean(axis=0)
+    assert blue[0] - red[0] > 10
+    assert abs(blue[1] - red[1]) < 3
+
+
+def test_a_model_without_lights_is_not_dark(tmp_path: Path) -> None:
+    """The side of a white box that faces the camera; a model with a light of its own keeps its brightness."""
+    box = '<geom type="box" size="1 1 1"/><camera name="front" pos="0 -5 0" xyaxes="1 0 0 0 0 1"/>'
+    shown = {}
+    for name, light in (("without", ""), ("with", '<light pos="0 9 0" dir="0 1 0"/>')):
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><default><geom rgba="1 1 1 1"/></default><worldbody>{box}{light}</worldbody></mujoco>'
+        )
+        seen = frame(forward(model), tmp_path, camera="front")
+        shown[name] = seen[60, 80].mean()
+    assert shown["without"] > 210
+    assert shown["with"] < 200

@@ -238,6 +238,15 @@ CASES: dict[str, Case] = {
     "excitation in percent": Case(
         [], (*RUN, "--excitation", "BIC=constant:50"), 0, ["the excitation of 'BIC' reaches 50", "divide them by 100"]
     ),
+    "excitation below zero": Case(
+        [], (*RUN, "--excitation", "BIC=sine:0.5,1"), 0,
+        ["the excitation of 'BIC' falls to -0.5", "its range of control, 0 to 1", "needs an offset"],
+    ),
+    "control outside the range of a servo": Case(
+        [("<actuator/>", CABLE.replace("<motor", "<position")), ('gear="10" ctrlrange="0 1"', 'ctrlrange=".07 .14"')],
+        (*RUN, "--excitation", "M=step:0.1@0.01"), 0,
+        ["the excitation of 'M' falls to 0", "its range of control, 0.07 to 0.14", "see its ctrlrange"],
+    ),
 }  # fmt: skip
 
 
@@ -361,7 +370,7 @@ def test_the_model_without_a_mistake_has_no_finding(
         "--prescribe",
         "elbow=sine:5deg,1,15deg",
         "--excitation",
-        "sine:0.5,1",
+        "sine:0.5,1,0.5",
     )
     assert (ran.code, said(ran)) == (0, [])
 

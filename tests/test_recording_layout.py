@@ -185,3 +185,25 @@ def test_a_model_of_the_world_alone_is_looked_at(tmp_path: Path) -> None:
         run.log(data)
     (eye,) = layout(tmp_path / "run.rrd", "EyeControls3D:position")
     assert np.isfinite(eye).all()
+
+
+@pytest.mark.parametrize(
+    ("gravity", "axes"),
+    [("0 0 -9.81", (3, 5, 1)), ("0 -9.81 0", (3, 1, 6)), ("0 0 0", (3, 5, 1))],
+)
+def test_the_viewer_is_told_which_axis_points_up(
+    gravity: str, axes: tuple[int, int, int], tmp_path: Path
+) -> None:
+    """rerun numbers the directions of x, y and z: up 1, down 2, right 3, left 4, forward 5, back 6."""
+    model = mujoco.MjModel.from_xml_string(XML)
+    model.opt.gravity[:] = [float(x) for x in gravity.split()]
+    record(model, tmp_path / "run.rrd", 1)
+    component = "ViewCoordinates:xyz"
+    found = [
+        value
+        for chunk in RrdReader(tmp_path / "run.rrd").stream()
+        if component in (batch := chunk.to_record_batch()).schema.names
+        for row in batch.column(component).to_pylist()
+        for value in row
+    ]
+    assert [tuple(value) for value in found] == [axes]

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from cli_runs import ELBOW, run_here, said
+from first_model import edited
 
 import mjwrap as mw
+from mjwrap.comparison import compare_motion
 from mjwrap.runs import RunSettings, Simulation, simulate
 
 SHORT = RunSettings(duration=0.02, excitation=["pulses:0.6,0.1"], positions={"elbow_flexion": 0.7})
@@ -60,6 +63,59 @@ def test_settings_that_do_not_fit_the_model_are_errors(
 ) -> None:
     with pytest.raises(error, match=told):
         Simulation(ELBOW, settings)
+
+
+@pytest.mark.parametrize(
+    ("excitation", "told"),
+    [
+        ("constant:-0.1", "falls to -0.1"),
+        ("constant:1.5", "reaches 1.5"),
+        ("sine:0.4,1,0.3", "falls to -0.1"),
+        ("cosine:0.8,1,0.5", "goes from -0.3 to 1.3"),
+        ("step:-1@0.5", "falls to -1"),
+        ("pulses:-0.2", "falls to -0.2"),
+        ("TABLE", "goes from -0.5 to 2"),
+    ],
+)
+def test_what_is_clipped_is_said_once(excitation: str, told: str, tmp_path: Path) -> None:
+    """Of all muscles together, with their range; a comparison of motions says it too."""
+    model = mujoco.MjModel.from_xml_path(ELBOW)
+    names = mw.MuscleSystem(model).names
+    if excitation == "TABLE":
+        excitation = str(tmp_path / "e.csv")
+        values = np.tile([[-0.5], [2.0]], (1, len(names)))
+        mw.write_table(excitation, mw.Table(np.array([0.0, 1.0]), tuple(names), values))
+    for start in (
+        lambda: Simulation(ELBOW, RunSettings(duration=0.01, excitation=[excitation])),
+        lambda: compare_motion(model, [excitation], 0.002),
+    ):
+        with pytest.warns(UserWarning, match="range of control") as seen:
+            start()
+        (warning,) = seen
+        shown = ", ".join(f"'{name}'" for name in names[:6])
+        text = f"the excitation of {shown} and 1 more {told}, outside its range of control, 0 to 1, and is clipped"
+        assert str(warning.message).startswith(text)
+
+
+def test_zero_is_the_rest_of_a_muscle_and_an_ideal_one_has_no_limit(tmp_path: Path) -> None:
+    """A muscle with a least activation, and one without an actuator whose force is its excitation times a constant."""
+    file = tmp_path / "arm.xml"
+    file.write_text(edited())
+    Simulation(str(file), RunSettings(duration=0.01, excitation=["TRI=constant:3"]))
+    spec = mujoco.MjSpec.from_file(ELBOW)
+    for actuator in spec.actuators:
+        actuator.ctrlrange = (0.01, 1.0)
+    file.write_text(spec.to_xml())
+    Simulation(str(file), RunSettings(duration=0.01, excitation=["pulses"]))
+    with pytest.warns(UserWarning, match=r"falls to -0.1, outside its range of control, 0.01 to 1"):
+        Simulation(str(file), RunSettings(duration=0.01, excitation=["constant:-0.1"]))
+
+
+@pytest.mark.parametrize(
+    "excitation", ["constant:0", "constant:1", "sine:0.5,1,0.5", "pulses", "random", "step:1@0"]
+)
+def test_what_is_within_the_range_is_not_clipped(excitation: str) -> None:
+    Simulation(ELBOW, RunSettings(duration=0.01, excitation=[excitation]))
 
 
 def test_an_unknown_kind_of_number_is_an_error() -> None:

@@ -104,8 +104,8 @@ class ParameterReport:
         muscles = len({finding.muscle for finding in self.findings})
         kinds = ", ".join(f"{kind} {counts[kind]}" for kind in Implausible if counts[kind])
         lines.append(
-            f"findings: {len(self.findings)}, in {counted(muscles, 'muscle')}"
-            + (f" ({kinds})" if kinds else "")
+            f"findings: {len(self.findings)}"
+            + (f", in {counted(muscles, 'muscle')} ({kinds})" if self.findings else "")
         )
         lines += [f"{name}: {remark}" for name, remarks in self.remarks.items() for remark in remarks]
         return "\n".join(lines)

@@ -14,6 +14,7 @@ from mjwrap.errors import MjwrapError
 from mjwrap.mjcf import dof_names, name_of
 from mjwrap.mjcf.tuple_names import declares_muscle
 from mjwrap.model.takeover import Takeover
+from mjwrap.runs.control_limits import check_levels
 from mjwrap.runs.excitation import Excitation
 from mjwrap.system import CableSystem, MuscleSystem
 from mjwrap.system.pieces import PieceSwitch
@@ -145,6 +146,7 @@ def compare_motion(
     native_model, driven_model = pristine(model), pristine(model)
     muscles = CableSystem(driven_model, side_rule=side_rule)
     excitation, pieces = Excitation(muscles, entries, seed), PieceSwitch(native_model)
+    check_levels(muscles, excitation)
     native, driven = mujoco.MjData(native_model), mujoco.MjData(driven_model)
     for each, data in ((native_model, native), (driven_model, driven)):
         if key >= 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 import mujoco
@@ -15,7 +15,8 @@ from mjwrap.comparison.paired_evaluation import NO_TENDON, PLACEHOLDER, Batch, C
 from mjwrap.comparison.verdict import MuscleSummary, Outcome
 from mjwrap.errors import ModelError
 from mjwrap.poses.joint_sweeps import PoseMaker
-from mjwrap.system import CableSystem
+from mjwrap.system import CableSystem, kinds
+from mjwrap.text import counted_paths, noun
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ class PoseComparison:
         left_out: muscles that were left out, with the reason.
         poses: number of poses.
         side_rule: the rule of mjwrap's paths.
+        kinds: "muscle", "cable" or "tendon" (without an actuator) by name.
     """
 
     muscles: dict[str, MuscleSummary] = field(default_factory=dict)
@@ -37,6 +39,16 @@ class PoseComparison:
     left_out: dict[str, str] = field(default_factory=dict)
     poses: int = 0
     side_rule: int = 3
+    kinds: dict[str, str] = field(default_factory=dict)
+
+    def noun(self, several: bool = False) -> str:
+        """Return the word for what was compared, such as "cable", or "muscles and cables" for several."""
+        return noun((self.kinds.get(name, "muscle") for name in self.muscles), several)
+
+    def counted(self, names: Collection[str]) -> str:
+        """Return the number of names with their kinds, such as "2 muscles and 1 cable"."""
+        found = [self.kinds.get(name, "muscle") for name in names]
+        return counted_paths(len(found), found.count("cable"), found.count("tendon"))
 
     def total(self, outcome: Outcome) -> int:
         """Return the number of poses, over all muscles, with an outcome."""
@@ -95,7 +107,7 @@ def compare_poses(
             f"no muscle {', '.join(repr(n) for n in unknown)}; muscles: {', '.join(known) or 'none'}"
         )
     comparer = Comparer(muscles, list(names or known))
-    found = PoseComparison(left_out=comparer.left_out, side_rule=muscles.side_rule)
+    found = PoseComparison(left_out=comparer.left_out, side_rule=muscles.side_rule, kinds=kinds(muscles))
     start = np.array(model.qpos0 if base is None else base, dtype=np.float64)
     makers = [PoseMaker(model, start, seed)]
     joints = makers[0].joints()

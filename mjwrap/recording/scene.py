@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from mjwrap.model.upright import up_axis
 from mjwrap.recording.groups import Group, crossed_coordinates, given_groups, moved_groups
 from mjwrap.recording.static_shapes import draws, geom_shape, pose, surface_shape
 from mjwrap.recording.stream import Stream
@@ -116,7 +117,7 @@ class Scene:
 
     def log_static(self, stream: Stream) -> None:
         """Log geoms, muscle sites, and the style of lines, points and curves."""
-        stream.static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        stream.static("world", _up(self.model))
         model = self.model
         for geom, path in enumerate(self.geoms):
             shape = geom_shape(model, geom, wraps=geom in self.wrapping)
@@ -199,6 +200,12 @@ def entity(*parts: str) -> str:
 def model_name(model: Any) -> str:
     """Return the name in the element `<mujoco model="...">`."""
     return model.names.split(b"\0", 1)[0].decode()
+
+
+def _up(model: Any) -> rr.ViewCoordinates:
+    """Return which axis of the world points up, for the viewer's camera."""
+    axis, sign = up_axis(model)
+    return getattr(rr.ViewCoordinates, f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if sign > 0 else 'DOWN'}")
 
 
 def _moves(model: Any, body: int) -> bool:

@@ -100,7 +100,7 @@ class Simulation:
             engine.data.qpos.copy()
         )  # (nq,) positions at the start, also of joints that are prescribed
         self.excitation = Excitation(engine.muscles, settings.excitation, settings.seed)
-        check_levels(engine.muscles.model, self.excitation)
+        check_levels(engine.muscles, self.excitation)
         self.prescribed = PrescribedMotion(engine.model, settings.prescribed, option=option)
         check_free(engine.model, self.prescribed.joints, settings.positions)
         self.pushes = Pushes(engine.muscles)

@@ -125,6 +125,18 @@ def twin_of(muscles: MuscleSystem, model: mujoco.MjModel) -> MuscleSystem:
     return MuscleSystem(model, side_rule=muscles.side_rule)
 
 
+def kinds(muscles: MuscleSystem) -> dict[str, str]:
+    """Return "muscle", "cable" or "tendon" (without an actuator) by name, also for what stays with MuJoCo."""
+    found = dict.fromkeys([*muscles.names, *muscles.native], "muscle")
+    for name in muscles.native:
+        actuator = mujoco.mj_name2id(muscles.model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+        if actuator >= 0 and not is_muscle(muscles.model, actuator):
+            found[name] = "cable"
+    if isinstance(muscles, CableSystem):
+        found |= dict.fromkeys(muscles.cables, "cable") | dict.fromkeys(muscles.bare, "tendon")
+    return found
+
+
 def is_cable(muscle: MuscleDeclaration) -> bool:
     """Return whether MuJoCo computes the force of a muscle."""
     return isinstance(muscle.parameters, ActuatorForce)

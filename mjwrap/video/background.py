@@ -18,6 +18,7 @@ _HEX = re.compile(r"#[0-9a-fA-F]{6}")
 FLOOR = 0.06  # difference in brightness of a floor from the background
 SCENERY = 2.0  # a mesh of the world so many times larger than all muscles is a room around them
 _NEAR, _FAR = 0.94, 0.98  # of the far clipping distance: where the fog begins, and where the backdrop stands
+AMBIENT, DIFFUSE, SPECULAR = 0.4, 0.5, 0.2  # of the headlight of a model without lights
 _FLAGS = ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_REFLECTION")
 
 
@@ -67,6 +68,15 @@ def paint_background(scene: mujoco.MjvScene, context: mujoco.MjrContext, color: 
     )
     backdrop.category = int(mujoco.mjtCatBit.mjCAT_DECOR)
     scene.ngeom += 1
+
+
+def brighten(scene: mujoco.MjvScene) -> None:
+    """Let the headlight be enough for a model without lights, which MuJoCo's default one leaves dark."""
+    for light in scene.lights[: scene.nlight]:
+        if light.headlight:
+            light.ambient[:] = np.maximum(light.ambient, AMBIENT)
+            light.diffuse[:] = np.maximum(light.diffuse, DIFFUSE)
+            light.specular[:] = np.minimum(light.specular, SPECULAR)
 
 
 def scenery(model: mujoco.MjModel, data: mujoco.MjData, middle: Any, size: float) -> set[int]:

@@ -13,7 +13,7 @@ from mjwrap import validation
 from mjwrap.errors import RecordingError
 from mjwrap.files.atomic import PartFile, RunLog, require
 from mjwrap.validation import is_positive
-from mjwrap.video.camera import find_camera, look_at_muscles
+from mjwrap.video.camera import find_camera, look_at_muscles, turn_upright
 from mjwrap.video.formats import FORMATS, Picture, Writer
 from mjwrap.video.look import FilmLook
 from mjwrap.video.offscreen import Offscreen
@@ -36,7 +36,8 @@ class Video(RunLog):
         width: of a frame [pixels].
         height: of a frame [pixels].
         camera: name or id of a camera of the model, "muscles" for a camera that looks at all muscles when the film
-            begins, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model.
+            begins, a mujoco.MjvCamera, or None for MuJoCo's free camera on the whole model. Up is
+            against gravity for "muscles" and None.
         option: a mujoco.MjvOption, which selects what is shown.
         background: "light", "dark", a colour "#RRGGBB", or "model" for the model's own sky and scenery. With a colour,
             planes lose their texture, and meshes of the world around the muscles or apart from them are left out.
@@ -77,6 +78,7 @@ class Video(RunLog):
             require(name, pixels, good and 1 <= pixels <= 16384, "a number of pixels, 1 to 16384")
         validation.flag(shadows, "shadows", RecordingError)
         self._model, self._camera = model, find_camera(model, camera)
+        self._free = camera is None or self._camera is None  # and so has to be turned to where up is
         self._option = option or mujoco.MjvOption()
         self._look = FilmLook(background, colors, surfaces, legend, int(width), int(height))
         self._signature = model.signature
@@ -123,7 +125,13 @@ class Video(RunLog):
 
     def _picture(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> Picture:
         dress = self._look.dress(data)
-        return self._look.finish(self._canvas.picture(data, camera, self._option, dress))
+
+        def arrange(scene: mujoco.MjvScene, context: mujoco.MjrContext) -> None:
+            if self._free:
+                turn_upright(scene, self._model)
+            dress(scene, context)
+
+        return self._look.finish(self._canvas.picture(data, camera, self._option, arrange))
 
     @property
     def _empty(self) -> bool:

@@ -10,7 +10,13 @@ import numpy as np
 
 from mjwrap import validation
 from mjwrap.errors import RecordingError
-from mjwrap.video.background import background_color, floor_color, paint_background, scenery
+from mjwrap.video.background import (
+    background_color,
+    brighten,
+    floor_color,
+    paint_background,
+    scenery,
+)
 from mjwrap.video.camera import extent, muscle_points
 from mjwrap.video.formats import Picture
 from mjwrap.video.legend import Legend
@@ -84,5 +90,7 @@ class FilmLook:
         looks.dress(scene, data)
         if self._color is not None:
             hide(scene, self._left_out)
+            if not data.model.nlight:
+                brighten(scene)
             pale_floors(scene, floor_color(self._color))
             paint_background(scene, context, self._color)

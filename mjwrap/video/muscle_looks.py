@@ -39,8 +39,14 @@ LEGEND = 12  # more muscles than this have no legend by themselves
 GLOW = 0.4  # of a floor without its texture, so that it is not dark where no light falls
 AROUND, ALONG = 25, 17  # points of a surface that is drawn as triangles
 
-_GEOM, _TENDON, _ACTUATOR = (
-    int(x) for x in (mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_TENDON, mujoco.mjtObj.mjOBJ_ACTUATOR)
+_UNKNOWN, _GEOM, _TENDON, _ACTUATOR = (
+    int(x)
+    for x in (
+        mujoco.mjtObj.mjOBJ_UNKNOWN,
+        mujoco.mjtObj.mjOBJ_GEOM,
+        mujoco.mjtObj.mjOBJ_TENDON,
+        mujoco.mjtObj.mjOBJ_ACTUATOR,
+    )
 )
 _CAPSULE, _SPHERE, _MESH = (
     int(x) for x in (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_MESH)
@@ -75,6 +81,9 @@ class MuscleLooks:
             for i, muscle in enumerate(declared)
             if muscle.tendon >= 0 or muscle.actuator >= 0
         }
+        alone = [i for i, muscle in enumerate(declared) if muscle.tendon < 0 and muscle.actuator < 0]
+        if len(alone) == 1:  # the scene does not tell several of these apart
+            self._identity[_UNKNOWN, -1] = alone[0]
         self._via = [muscle.via_sites for muscle in declared]
         self._wraps = {
             geom: surface
@@ -109,7 +118,8 @@ class MuscleLooks:
         """Return names and colours for a legend; none if colours say nothing."""
         entries: list[Entry] = []
         if self.colors == MUSCLE:
-            entries = [(name, PALETTE[i % len(PALETTE)], False) for i, name in enumerate(self._names)]
+            told = sorted(self._identity.values())
+            entries = [(self._names[i], PALETTE[i % len(PALETTE)], False) for i in told]
         elif self.colors == ACTIVATION and self._names:
             entries = [
                 (f"activation {share:g}", RELAXED + share * (ACTIVE - RELAXED), False)
@@ -179,11 +189,10 @@ def pale_floors(scene: mujoco.MjvScene, color: Array) -> None:
 def _one_look(model: mujoco.MjModel, muscles: list[Any]) -> bool:
     looks = {
         (tuple(float(x) for x in model.tendon_rgba[m.tendon]), int(model.tendon_matid[m.tendon]))
-        if m.tendon >= 0
-        else None
         for m in muscles
+        if m.tendon >= 0
     }
-    return len(looks) == 1
+    return len(looks) <= 1  # one without a tendon has no look of its own
 
 
 def _has_shape(model: mujoco.MjModel, geom: int, surface: Surface) -> bool:

@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, few, millimetres, muscle_of, quoted
+from mjwrap.checking.mistakes.finding import Mistake, PossibleMistake, millimetres, muscle_of, quoted
 from mjwrap.checking.mistakes.pose import Posed
 from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.poses.joint_sweeps import PoseMaker
-from mjwrap.text import counted
+from mjwrap.text import counted, few
 
 Array = NDArray[np.float64]
 LEAST = 1e-3  # moment arm that counts as none, as a share of the muscle's size

@@ -88,8 +88,3 @@ def muscle_of(model: mujoco.MjModel, muscle: MuscleDeclaration) -> str:
 def millimetres(length: float) -> str:
     """Return a length [m] for a message."""
     return f"{1e3 * length:.3g} mm" if length < 1.0 else f"{length:.3g} m"
-
-
-def few(names: list[str], most: int = 6) -> str:
-    """Return names for a message, the first of many."""
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -178,7 +178,7 @@ def _quiet(name: str) -> Iterator[None]:
     seen: set[str] = set()
 
     def show(text: str) -> None:
-        kind = text.split(".")[0]
+        kind = text.split(". ")[0]
         if kind not in seen and not kind.startswith(_MYO_NOISE):
             seen.add(kind)
             print(f"{name}: warning: {' '.join(text.split())}", file=sys.stderr)

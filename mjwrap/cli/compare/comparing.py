@@ -33,8 +33,8 @@ from mjwrap.mjcf import dof_names
 from mjwrap.runs.excitation import Excitation
 from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.runs.state_tables import read_states
-from mjwrap.system import CableSystem
-from mjwrap.text import counted, counted_paths, nearest
+from mjwrap.system import CableSystem, kinds
+from mjwrap.text import counted, nearest, noun
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,8 @@ def compare(settings: CompareSettings) -> int:
         name: verdict(summary, [jump for jump in found.jumps if jump.muscle == name])
         for name, summary in found.muscles.items()
     }
-    cables, bare = (len(found.muscles.keys() & set(group)) for group in (muscles.cables, muscles.bare))
-    paths = counted_paths(len(found.muscles), cables, bare)
     report.say(
-        f"{settings.model}: {paths} at {counted(found.poses, 'pose')} each; MuJoCo "
+        f"{settings.model}: {found.counted(found.muscles)} at {counted(found.poses, 'pose')} each; MuJoCo "
         f"{mujoco.__version__}, mjwrap with MuJoCo {found.side_rule}'s rule for side sites"
     )
     tell_poses(report.say, found, verdicts)
@@ -122,7 +120,7 @@ def compare(settings: CompareSettings) -> int:
     if rows is not None:
         outputs.attempt("csv", lambda: told.update(csv=f" ({rows.close()})"))
 
-    tell_tables(report.say, tables)
+    tell_tables(report.say, tables, found.noun())
     motion = None
     if settings.duration > 0.0 and not model.nv:
         report.say("\nno simulation: the model has no joint")
@@ -193,13 +191,16 @@ def choose(muscles: MuscleSystem, wanted: Sequence[str] | None) -> list[str] | N
     """Return the names of the muscles that the patterns `wanted` match, None for all."""
     known = [*muscles.names, *muscles.native]
     if not known:
-        raise UserError("the model has no muscles: nothing to compare")
+        raise UserError("the model has no muscles and no actuators on spatial tendons: nothing to compare")
     if wanted is None:
         return None
     found: list[str] = []
     for pattern in wanted:
         fit = [name for name in fnmatch.filter(known, pattern) if name not in found]
         if not fit and pattern not in found:
-            raise UserError(f"no muscle '{pattern}'{nearest(pattern, known)}; muscles: {', '.join(known)}")
+            kind = kinds(muscles).values()
+            raise UserError(
+                f"no {noun(kind)} '{pattern}'{nearest(pattern, known)}; {noun(kind, True)}: {', '.join(known)}"
+            )
         found += fit
     return found

@@ -68,6 +68,8 @@ def write_page(
         motion=_motion(motion, found.unlike) if motion is not None and motion.difference.size else None,
         left_out=found.left_out,
         counted=counted,
+        noun=found.noun(),
+        nouns=found.noun(several=True),
     )
     output.write_text(page)
 
@@ -77,7 +79,7 @@ def _facts(found: PoseComparison) -> list[dict[str, object]]:
     both = [s for s in found.muscles.values() if not s.native_only]
     equal = sum(s.counts[Outcome.AGREE.name] == s.poses for s in both)
     facts: list[tuple[int, str]] = [
-        (len(both), f"muscles compared at {found.poses} poses each"),
+        (len(both), f"{found.noun(several=True)} compared at {found.poses} poses each"),
         (equal, "equal at every pose"),
         (len(both) - equal, "differ at some pose"),
         (len(found.muscles) - len(both), "stay with MuJoCo's own tendon"),
@@ -86,7 +88,7 @@ def _facts(found: PoseComparison) -> list[dict[str, object]]:
         jumps = [j for j in found.jumps if j.program == program]
         what = f"jumps of {program}'s {paths} along the sweeps"
         if jumps:
-            muscles = counted(len({j.muscle for j in jumps}), "muscle")
+            muscles = found.counted({j.muscle for j in jumps})
             what += f", in {muscles}{starred(jumps)}; the largest is {_largest(jumps)}"
         facts.append((len(jumps), what))
     facts.append((found.at_fault, "poses at which mjwrap is wrong"))

@@ -14,7 +14,7 @@ from mjwrap.cli.compare.data_panels import DataPanel
 from mjwrap.cli.compare.text import TITLES
 from mjwrap.comparison import AGREE, MotionDifference, MuscleSummary, Outcome, PoseComparison
 from mjwrap.files.atomic import PartFile
-from mjwrap.text import counted
+from mjwrap.text import counted, few
 
 COLOURS = {
     Outcome.AGREE: "#4c9f70",
@@ -33,7 +33,6 @@ NATIVE, OWN = (
 )
 SWEEPS = 5  # muscles whose sweeps are shown
 MOTIONS = 6  # joints whose differences are shown
-NAMED = 6  # muscles that a note names
 WIDE = 110  # letters of a line below the plot
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -106,24 +105,20 @@ def left_out_of_plot(found: PoseComparison, shown: list[MuscleSummary]) -> str:
     notes = []
     drawn = [s for s in found.muscles.values() if s.curves is not None]
     if len(drawn) > len(shown):
+        every = found.counted([s.name for s in drawn])
         notes.append(
-            f"Curves of {len(shown)} of {len(drawn)} muscles: those with the largest differences, then with jumps, "
-            "then with the largest changes of length. The others have bars only."
+            f"Curves of {len(shown)} of {every}: those with the largest differences, then with jumps, then with the "
+            "largest changes of length. The others have bars only."
         )
     still = [name for name, s in found.muscles.items() if s.curves is None]
     if still:
-        notes.append(f"No curves, because no joint changes their length: {_named(still)}.")
+        notes.append(f"No curves, because no joint changes their length: {few(still)}.")
     native = [name for name, s in found.muscles.items() if s.native_only]
     if native:
-        notes.append(f"No bar, because they stay with MuJoCo's own tendon: {_named(native)}.")
+        notes.append(f"No bar, because they stay with MuJoCo's own tendon: {few(native)}.")
     if found.left_out:
-        notes.append(f"Not compared (the text says why): {_named(list(found.left_out))}.")
+        notes.append(f"Not compared (the text says why): {few(list(found.left_out))}.")
     return " ".join(notes)
-
-
-def _named(names: list[str]) -> str:
-    more = len(names) - NAMED
-    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def joint_unit(turning: bool) -> tuple[float, str]:

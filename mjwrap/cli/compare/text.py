@@ -60,14 +60,14 @@ def tell_poses(say: Say, found: PoseComparison, verdicts: dict[str, Verdict]) ->
                 f"  {s.name}: MuJoCo {s.length.native:.6f} m, mjwrap {s.length.mjwrap:.6f} m at {where(s.length)}"
             )
     if found.jumps:
-        _tell_jumps(say, found.jumps)
+        _tell_jumps(say, found)
 
 
 def _tell_table(say: Say, found: PoseComparison, both: list[MuscleSummary]) -> None:
     shown = [o for o in Outcome if o == Outcome.AGREE or found.total(o)]
     rows = [
         [
-            "muscle",
+            found.noun(),
             "poses",
             *(TITLES[o] for o in shown),
             "largest difference: length [m]",
@@ -83,14 +83,17 @@ def _tell_table(say: Say, found: PoseComparison, both: list[MuscleSummary]) -> N
     say("\n".join(aligned(rows)))
 
 
-def _tell_jumps(say: Say, jumps: list[Jump]) -> None:
+def _tell_jumps(say: Say, found: PoseComparison) -> None:
     """Print the largest jump of each program, muscle and joint."""
+    jumps = found.jumps
     largest: dict[tuple[str, str, str], Jump] = {}
     for jump in jumps:
         key = jump.program, jump.muscle, jump.sweep
         if key not in largest or abs(jump.length) > abs(largest[key].length):
             largest[key] = jump
-    say(f"\njumps along the sweeps: {len(jumps)}{starred(jumps)}; the largest of each muscle and joint")
+    say(
+        f"\njumps along the sweeps: {len(jumps)}{starred(jumps)}; the largest of each {found.noun()} and joint"
+    )
     for jump in sorted(largest.values(), key=lambda j: (j.program, j.muscle, j.sweep)):
         say(
             f"  {jump.program} {jump.muscle} at {jump.where}: {millimetres(jump.length)} mm, "
@@ -118,16 +121,16 @@ def where(extreme: Extreme) -> str:
     return f"{extreme.motion} {extreme.at:g} ({told}{', ...' if len(extreme.joints) > 6 else ''})"
 
 
-def tell_tables(say: Say, tables: Sequence[TableDifference]) -> None:
-    """Print the differences of both programs from another program's tables, largest first."""
+def tell_tables(say: Say, tables: Sequence[TableDifference], what: str) -> None:
+    """Print the differences of both programs from another program's tables, largest first; what: is in them."""
     if not tables:
         return
     say("\ndifferences from the given tables: program minus table, in mm; spread: rms without the mean")
-    rows = [["muscle", "program", "quantity", "rows", "mean", "spread", "largest", "at [s]"]]
+    rows = [[what, "program", "quantity", "rows", "mean", "spread", "largest", "at [s]"]]
     for d in sorted(tables, key=lambda d: -d.spread):
-        what = f"moment arm, {d.about}" if d.about else "length"
+        quantity = f"moment arm, {d.about}" if d.about else "length"
         numbers = [millimetres(x, 4) for x in (d.mean, d.spread, d.largest)]
-        rows.append([d.muscle, d.program, what, f"{d.rows}", *numbers, f"{d.time:g}"])
+        rows.append([d.muscle, d.program, quantity, f"{d.rows}", *numbers, f"{d.time:g}"])
     say("\n".join(aligned(rows, (0, 1, 2))))
 
 
@@ -157,7 +160,7 @@ def tell_motion(
     if motion.stopped:
         say(f"  ended early: {motion.stopped}")
     if motion.paths:
-        say("  muscles without a path at some steps of mjwrap's simulation:")
+        say("  without a path at some steps of mjwrap's simulation:")
         say("\n".join(f"    {line}" for line in motion.paths.splitlines()))
 
 

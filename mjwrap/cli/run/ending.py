@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.mjcf import is_muscle, name_of
+from mjwrap.mjcf import name_of
 from mjwrap.mjcf.joint_ranges import joint_range
 from mjwrap.runs.excitation import control_names
 from mjwrap.runs.simulation import Simulation
-from mjwrap.system import CableSystem, MuscleSystem
+from mjwrap.system import kinds
 from mjwrap.text import counted
 
 MOST = 6  # joints of which the position is told
@@ -57,8 +57,8 @@ def undriven(simulation: Simulation) -> str:
         return ""
     model, data = simulation.engine.model, simulation.engine.data
     still = not model.njnt or max(_changes(model, simulation.start, data.qpos)) < STILL
-    cables = _cables(simulation.muscles)
-    pulling = [name for name in excitation.muscle_names if name not in cables]
+    kind = kinds(simulation.muscles)
+    pulling = [name for name in excitation.muscle_names if kind.get(name) != "cable"]
     one = (pulling or excitation.names)[0]
     add = f"add --excitation pulses, or for one of them --excitation {one}=constant:0.5"
     if not pulling:
@@ -69,15 +69,6 @@ def undriven(simulation: Simulation) -> str:
     if still:
         return f"nothing moved, because all controls are zero: {add}"
     return f"all controls were zero, so that only gravity, springs and passive forces moved it: {add}"
-
-
-def _cables(muscles: MuscleSystem) -> list[str]:
-    """Return the cables, also those that stay with MuJoCo."""
-    own = muscles.cables if isinstance(muscles, CableSystem) else []
-    ids = {
-        name: mujoco.mj_name2id(muscles.model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in muscles.native
-    }
-    return [*own, *(name for name, i in ids.items() if i >= 0 and not is_muscle(muscles.model, i))]
 
 
 def _set_points(model: mujoco.MjModel) -> list[str]:

@@ -139,7 +139,7 @@ def tell(
             report.say(f"  {name}: {reason}")
     failed = engine.failures()
     if failed:
-        report.say("muscles without a path at some steps:")
+        report.say("without a path at some steps:")
         for name, why in failed.items():
             report.say(f"  {name}: {why}")
     if sentence := simulation.pushes.told():

@@ -58,7 +58,7 @@ class MuscleWriter:
         """Write a muscle that an actuator drives, with a tendon over its sites for MuJoCo's sake."""
         actuator = self._actuators.new(name)
         tendon = self._tendons.new(f"{actuator}_tendon")
-        line = self._document.add("tendon", "spatial", name=tendon, width=0.001)
+        line = self._document.add("tendon", "spatial", name=tendon)
         for site, _ in itertools.groupby(route.sites):
             self._document.add(line, "site", site=site)
         limited = all(map(math.isfinite, controls)) and controls[0] < controls[1]
