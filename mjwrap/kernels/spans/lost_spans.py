@@ -1,9 +1,9 @@
 """Spans of which a search has found that they have no path: the next searches near by are left out.
 
 While an end lies deep inside a surface, a string seldom has a path, and a cold start that fails is the most expensive
-solve there is. So its rows become LOST and keep the ends at which it failed, each in the frame of its surface. As long as
-an end stays deep inside a surface and both ends stay near those places, the answer is the same without a search: the
-path that comes back is found when an end has come out, or moved by LOST_MOVE sizes of the nearest-moved surface. This is
+solve there is. So its rows become LOST and keep the ends at which it failed, each in the frame of its surface. As long
+as an end stays deep inside a surface, and both ends near those places, the answer is the same without a search. A path
+that comes back is found once no end is deep inside, or an end has moved by LOST_MOVE sizes of some surface. This is
 saved state like the rest of a row: the answer follows from the pose and from it.
 """
 

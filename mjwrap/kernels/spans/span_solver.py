@@ -271,10 +271,9 @@ def solve_span(lo, hi, ends, node, tol, direct):
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     replaces it by the new one; a path that is lost is searched for as at a cold start. With `direct` a lone obstacle is
     wrapped in closed form; of its saved solution only the branch is used. Of a span whose sides all hold at every pose
-    nothing saved is used. Where an end lies inside a surface, length,
-    error and saved solution are those of the substitute path (`end_inside.py`), which is the path where the end is as
-    little inside as a rounded number may put it. Where a search has found neither a path nor a substitute path, the next
-    searches near by are left out (`lost_spans.py`).
+    nothing saved is used. Where an end lies inside a surface, length, error and saved solution are those of the
+    substitute path (`end_inside.py`), which is the path where the end is as little inside as a rounded number may put
+    it. Where a search has found neither of them, the next searches near by are left out (`lost_spans.py`).
     """
     if any_in_mode(lo, hi, node, LOST):
         if is_still_lost(lo, hi, ends, node):
