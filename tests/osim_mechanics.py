@@ -129,15 +129,3 @@ def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     for k, unit in enumerate(np.eye(model.nv)):
         mujoco.mj_mulM(model, data, full[k], unit)
     return full
-
-
-def restore_inertias(found: Written, model: mujoco.MjModel) -> None:
-    """Write the principal moments of the file over those that MuJoCo accepts, as the numerics keep them."""
-    for i in range(model.nnumeric):
-        name = model.numeric(i).name
-        if name.startswith("mjwrap_inertia_"):
-            at = model.numeric_adr[i]
-            body = model.body(name.removeprefix("mjwrap_inertia_")).id
-            if found.skeleton.inertias[model.body(body).name].mass_added == 0.0:
-                model.body_inertia[body] = model.numeric_data[at : at + 3]
-    mujoco.mj_setConst(model, mujoco.MjData(model))

@@ -11,9 +11,11 @@ from osim_mechanics import (
     mechanics,
     pose,
     reduction,
-    restore_inertias,
 )
-from osim_models import FROZEN
+from osim_models import FROZEN, model_file
+
+import mjwrap as mw
+from mjwrap.mjcf import read_model
 
 RECORDS = json.loads((FROZEN / "poses_and_mass.json").read_text())["models"]
 NAMES = sorted(name.removesuffix(".osim") for name in RECORDS)
@@ -29,7 +31,7 @@ def compared(name: str) -> tuple[float, float]:
     """Return the largest difference of poses [m or 1], and of M x relative to its largest element, over 50 poses."""
     record, found = RECORDS[f"{name}.osim"], mechanics(name)
     model = found.compile()
-    restore_inertias(found, model)
+    mw.osim.restore_inertias(model)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data = mujoco.MjData(model)
@@ -66,9 +68,40 @@ def test_non_physical_inertias_are_changed_as_little_as_reported():
     entries = {e.name: e for e in found.report.entries if e.kind == "Body" and e.outcome == "approximated"}
     assert set(entries) == {"clavicle", "scapula", "radius", "scapula_scapulothoracic_frame"}
     changed, restored = found.compile(), found.compile()
-    restore_inertias(found, restored)
+    assert set(mw.osim.restore_inertias(restored)) == {"clavicle", "scapula", "radius"}
     assert np.abs(changed.body_inertia - restored.body_inertia).max() > 1e-5
-    assert all(0.0 < entry.size < 1e-5 for entry in entries.values())
+    data, sizes = mujoco.MjData(changed), []
+    mujoco.mj_forward(changed, data)
+    before = mass_matrix(changed, data)
+    mujoco.mj_forward(restored, data)
+    after = mass_matrix(restored, data)
+    largest = float((np.abs(before - after) / np.sqrt(np.outer(np.diag(after), np.diag(after)))).max())
+    sizes = [entry.size for name, entry in entries.items() if name != "scapula_scapulothoracic_frame"]
+    assert 0.01 < max(sizes) <= sum(sizes)
+    assert largest <= sum(sizes) * 1.02
+
+
+def test_the_files_inertias_are_restored_wherever_mjwrap_loads_the_model(tmp_path):
+    path = tmp_path / "shoulder.xml"
+    imported = mw.import_osim(model_file("ThoracoscapularShoulderModel"), poses=1)
+    imported.save(path)
+    clavicle = next(
+        body for body in mechanics("ThoracoscapularShoulderModel").osim.bodies if body.name == "clavicle"
+    )
+    moments = np.linalg.eigvalsh(clavicle.inertia)
+    assert moments[0] + moments[1] < moments[2]
+    plain = mujoco.MjModel.from_xml_path(str(path))
+    assert np.abs(plain.body("clavicle").inertia - moments).max() > 1e-5
+    frame = mujoco.MjSpec()
+    frame.option.timestep, frame.option.integrator = (
+        imported.spec.option.timestep,
+        imported.spec.option.integrator,
+    )
+    frame.option.gravity = imported.spec.option.gravity
+    frame.attach(imported.spec, prefix="left_", frame=frame.worldbody.add_frame())
+    for model in (mw.load(path), read_model(path), mw.install(frame)):
+        found = model.body("left_clavicle" if model.body(1).name.startswith("left_") else "clavicle")
+        assert found.inertia == pytest.approx(moments, rel=1e-14)
 
 
 def test_a_welded_body_whose_inertia_is_not_physical_is_counted_with_its_carrier():

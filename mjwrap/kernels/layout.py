@@ -88,14 +88,17 @@ NO_GEODESIC = 7
 UNKNOWN_SURFACE = 8
 
 # ------------------------------------------------------------------------ columns of the saved solution
-S_MODE = 24  # COLD, FREE or TOUCHED
+S_MODE = 24  # LOST, COLD, FREE or TOUCHED
 S_SWEEP = 25  # angle swept about a cylinder's axis from the node before to the node after, with sign [rad]
-S_P = 26  # first contact point P in S (3) [m]; FREE and no closed form: start of the straight segment
-S_T = 29  # unit tangent at P in S (3); FREE and no closed form: end of the straight segment [m], zeros: not known
+S_P = (
+    26  # first contact point P in S (3) [m]; LOST, or FREE and no closed form: start of the straight segment
+)
+S_T = 29  # unit tangent at P in S (3); LOST, or FREE and no closed form: its end [m], zeros: not known
 S_ARC = 32  # arc length s [m]
 S_BEFORE = 33  # lengths of the straight segments to P and from Q in the last path that was found (2) [m]
 STATE = 11  # number of these columns
 
+LOST = -2.0  # a cold start that has found no path: see `spans/lost_spans.py`
 COLD = -1.0
 FREE = 0.0
 TOUCHED = 1.0

@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 
 from mjwrap.errors import ModelError
+from mjwrap.mjcf.file_inertias import restore_inertias
 from mjwrap.mjcf.file_kinds import foreign, opensim
 from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.named_models import MYO, OWN, myo_model, myo_spec, own_file, own_models
@@ -38,6 +39,7 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
     """Load an MJCF or MJB file, or a model by name: "mjwrap:NAME", "myo_sim:NAME".
 
     Raises `ModelError`, with MuJoCo's reason, if that fails. Warnings of MuJoCo become Python warnings.
+    Inertias that MuJoCo's compiler refuses are those of the file again (`restore_inertias`).
     """
     text = _source(path)
     if text.startswith(MYO):
@@ -66,6 +68,7 @@ def read_model(path: str | os.PathLike[str]) -> mujoco.MjModel:
             raise ModelError(f"{file} is not a model that MuJoCo can load: {reason}") from None
     for text in found:
         warnings.warn(f"{file}: {text}", stacklevel=2)
+    restore_inertias(model)
     return model
 
 

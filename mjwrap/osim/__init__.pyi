@@ -2,6 +2,7 @@
 
 from .coordinates import coordinates as coordinates
 from .coordinates import set_coordinates as set_coordinates
+from .inertias import restore_inertias as restore_inertias
 from .motions import motion_table as motion_table
 
 __all__: list[str]

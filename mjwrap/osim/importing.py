@@ -25,6 +25,7 @@ from mjwrap.osim.writing.routes import RouteWriter
 from mjwrap.osim.writing.sampled_poses import sampled_poses
 from mjwrap.osim.writing.sites import SiteWriter
 from mjwrap.osim.writing.skeleton import Skeleton
+from mjwrap.osim.writing.stable_step import PathLine, write_stable_step
 from mjwrap.osim.writing.unique_names import UniqueNames
 from mjwrap.osim.writing.wraps import write_wrap
 
@@ -109,7 +110,7 @@ def import_osim(
     document, report = Document(model.name), Report(model.name, model.version)
     folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]
     skeleton = write_mechanics(document, model, report, folders, bool(limits))
-    write_paths(document, model, report, skeleton, poses)
+    lines = write_paths(document, model, report, skeleton, poses)
     compiled = document.compile()
     data = mujoco.MjData(compiled)
     mujoco.mj_forward(compiled, data)
@@ -117,12 +118,15 @@ def import_osim(
         raise OsimError(
             f"'{path}': accelerations at the default pose are not finite; some number is too large"
         )
+    write_stable_step(document, compiled, report, lines)
     xml = document.to_xml()
     return Imported(mujoco.MjSpec.from_string(xml, assets=document.assets), report, xml, document.assets)
 
 
-def write_paths(document: Document, model: OsimModel, report: Report, skeleton: Skeleton, poses: int) -> None:
-    """Write all wrap objects and all forces along paths."""
+def write_paths(
+    document: Document, model: OsimModel, report: Report, skeleton: Skeleton, poses: int
+) -> list[PathLine]:
+    """Write all wrap objects and all forces along paths; return the muscles and the sites of their paths."""
     geoms, sites = UniqueNames(document, "geom"), SiteWriter(document, report, skeleton.drivers)
     pulls = [
         force for force in model.forces if isinstance(force, Muscle | Ligament | PathSpring | PathActuator)
@@ -136,3 +140,4 @@ def write_paths(document: Document, model: OsimModel, report: Report, skeleton: 
         muscles.write(pull)
     if any(muscles.default_activations):
         document.add("keyframe", "key", name="default", act=muscles.default_activations)
+    return muscles.lines

@@ -66,7 +66,9 @@ class PathSolution(Derivatives):
         known = end_inside.has_valid_length(self.status, self.tangency_error)
         self._saved = self._node[:, SAVED].copy() if known else saved_before.copy()
         if self.status == Status.ENDPOINT_INSIDE and not known:
+            lost = self._node[:, layout.S_MODE] == layout.LOST
             self._saved[:, 0] = layout.COLD  # the last contact point is unknown
+            self._saved[lost] = self._node[lost][:, SAVED]
         stands_in = known and not self.converged
         list_them = end_inside.list_pulling_segments if stands_in else segments.list_segments
         self._count = list_them(*self._ends, self._node, self._segments, 0)

@@ -18,6 +18,7 @@ from mjwrap.mjcf import (
     read_spec,
     with_remedy,
 )
+from mjwrap.mjcf.file_inertias import restore_inertias
 from mjwrap.mjcf.marks import PLUGIN_INSTANCE, own_instances
 from mjwrap.mjcf.missing_names import with_candidates
 from mjwrap.mjcf.named_models import quiet_prefixes
@@ -225,7 +226,7 @@ def _check_options(mode: str, keep_tendons: bool, side_rule: int | None) -> None
 def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
     take_error()
     try:
-        return spec.compile()
+        model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         reason = take_error()
         told = (
@@ -236,3 +237,5 @@ def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
             )
         )
         raise ModelError(told) from reason
+    restore_inertias(model)
+    return model

@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import mujoco
-
 from mjwrap import import_osim
 from mjwrap.cli.common.errors import FAULTS, UserError
 from mjwrap.cli.common.output import Report, check_unread, open_output
@@ -18,6 +16,7 @@ from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.importing.page import write_page
 from mjwrap.cli.importing.text import tell_entries, tell_verification
 from mjwrap.errors import OsimError
+from mjwrap.mjcf import read_model
 from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.importing import Imported
 from mjwrap.osim.verifying.differences import Verification, verify
@@ -119,7 +118,7 @@ def _verify(settings: ImportSettings, out: str, known: Reference | None) -> Veri
             )
         if settings.numbers:
             known.save(settings.numbers)
-    model = mujoco.MjModel.from_xml_path(out)
+    model = read_model(out)
     with contextlib.closing(progress_bar(len(known.poses), "poses", "mjwrap")) as bar:
         return verify(model, known, progress=lambda done, count: bar.update(1))
 

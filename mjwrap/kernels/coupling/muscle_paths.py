@@ -43,7 +43,7 @@ def _write_poses(lo, hi, links, poses, node):
             row[lay.POS + i] = pos[i]
         for i in range(9):
             row[lay.ROT + i] = rot[i]
-        if row[lay.S_MODE] == lay.COLD:
+        if row[lay.S_MODE] <= lay.COLD:
             cold = True
         elif not sided(k, node):
             continue
@@ -60,8 +60,10 @@ def _write_poses(lo, hi, links, poses, node):
 
 @jit
 def _roll_back(lo, hi, cold, node):
-    """Restore the last solution after a pose without a path; cold: make the next start a cold one."""
+    """Restore the last solution after a pose without a path; cold: make the next start a cold one, unless LOST."""
     for k in range(lo, hi):
+        if node[k, lay.S_MODE] == lay.LOST:
+            continue
         if cold:
             node[k, lay.S_MODE] = lay.COLD
         elif node[k, lay.KIND] != lay.VIA and node[k, lay.INSIDE] == 0.0:

@@ -173,6 +173,18 @@ def _return_to_previous_pose(node, before):
             node[k, S_MODE + i] = before[k, i]
 
 
+@jit
+def _return_to_last_path(node, before, cold):
+    """Restore the solution of the pose before, or make the next start a cold one; what is LOST stays so."""
+    for k in range(node.shape[0]):
+        if node[k, S_MODE] == lay.LOST:
+            continue
+        for i in range(lay.STATE):
+            node[k, S_MODE + i] = before[k, i]
+        if cold:
+            node[k, S_MODE] = lay.COLD
+
+
 @allocating
 def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
     """Solve every pose of a motion: origin, insertion (T, 3), pos (T, n, 3), quat (T, n, 4); results in info (T, INFO).
@@ -201,7 +213,4 @@ def solve_motion(origin, insertion, pos, quat, node, warm, tol, info):
             solve_chain(0, n, x, y, z, u, v, w, node, tol, False, info, j)
         if warm and not has_valid_length(info[j, I_STATUS], info[j, I_ERROR]):
             # the next pose starts from the last one that was solved, or cold if an end was inside a surface
-            _return_to_previous_pose(node, before)
-            for k in range(n):
-                if info[j, I_STATUS] == lay.ENDPOINT_INSIDE:
-                    node[k, S_MODE] = lay.COLD
+            _return_to_last_path(node, before, info[j, I_STATUS] == lay.ENDPOINT_INSIDE)

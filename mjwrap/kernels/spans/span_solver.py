@@ -21,10 +21,11 @@ from mjwrap.kernels.geometry.traits import branched, closed_form, sided
 from mjwrap.kernels.geometry.winding import TWO_PI, nearest_turn
 from mjwrap.kernels.spans.active_set_method import solve_active_set
 from mjwrap.kernels.spans.cold_start import ends_of_part
-from mjwrap.kernels.spans.end_inside import substitute_path
+from mjwrap.kernels.spans.end_inside import NO_SUBSTITUTE, substitute_path
 from mjwrap.kernels.spans.hinted_sides import meet_hints
 from mjwrap.kernels.spans.lift_off_touchdown import remove_contact
 from mjwrap.kernels.spans.lone_obstacle import solve_lone_obstacle
+from mjwrap.kernels.spans.lost_spans import is_still_lost, mark_lost
 from mjwrap.kernels.spans.saved_solutions import any_in_mode, restore_solutions, save_solutions, surface_end
 from mjwrap.kernels.spans.sided_start import start_from_sides
 from mjwrap.kernels.spans.span_ends import lies_on_surfaces
@@ -33,7 +34,7 @@ from mjwrap.kernels.wraps.sides import any_sided, forget
 KIND, SIZE, POS, ROT = lay.KIND, lay.SIZE, lay.POS, lay.ROT
 S_MODE, S_SWEEP, S_P, S_T = lay.S_MODE, lay.S_SWEEP, lay.S_P, lay.S_T
 W_OLD, W_START, W_START_ERROR = lay.W_OLD, lay.W_START, lay.W_START_ERROR
-COLD, FREE, TOUCHED = lay.COLD, lay.FREE, lay.TOUCHED
+LOST, COLD, FREE, TOUCHED = lay.LOST, lay.COLD, lay.FREE, lay.TOUCHED
 
 # A move is large if one of these bounds is exceeded; lengths are shares of the surface's size.
 FREE_MOVE = 0.25  # move of the ends of a free string
@@ -258,16 +259,26 @@ def _solve_without_hints(lo, hi, ends, node, tol, direct):
 
 
 @jit
+def _straight_distance(ends):
+    """Return the distance between the ends of a span [m]."""
+    return math.sqrt((ends[6] - ends[3]) ** 2 + (ends[7] - ends[4]) ** 2 + (ends[8] - ends[5]) ** 2)
+
+
+@jit
 def solve_span(lo, hi, ends, node, tol, direct):
     """Find the path from A to B over nodes lo..hi; return (status, length, ||f||, iterations, evaluations).
 
     ends = (base x, y, z, A x, y, z, B x, y, z), A and B relative to the base [m]. Starts from the saved solution and
     replaces it by the new one; a path that is lost is searched for as at a cold start. With `direct` a lone obstacle is
     wrapped in closed form; of its saved solution only the branch is used. Of a span whose sides all hold at every pose
-    nothing saved is used. Where an end lies inside a surface, length,
-    error and saved solution are those of the substitute path (`end_inside.py`), which is the path where the end is as
-    little inside as a rounded number may put it.
+    nothing saved is used. Where an end lies inside a surface, length, error and saved solution are those of the
+    substitute path (`end_inside.py`), which is the path where the end is as little inside as a rounded number may put
+    it. Where a search has found neither of them, the next searches near by are left out (`lost_spans.py`).
     """
+    if any_in_mode(lo, hi, node, LOST):
+        if is_still_lost(lo, hi, ends, node):
+            return lay.ENDPOINT_INSIDE, _straight_distance(ends), NO_SUBSTITUTE, 0, 0
+        forget(lo, hi, node)
     warm = not any_in_mode(lo, hi, node, COLD)
     if warm and hi - lo == 1 and closed_form(lo, node) and (direct or sided(lo, node)):
         good, total, error = solve_lone_obstacle(lo, ends, node, tol)
@@ -311,4 +322,6 @@ def solve_span(lo, hi, ends, node, tol, direct):
         evaluations += e
         if error <= tol and lies_on_surfaces(lo, hi, ends, node):
             status = lay.CONVERGED
+        elif not warm and evaluations > 0 and error >= NO_SUBSTITUTE:
+            mark_lost(lo, hi, ends, node)
     return status, total, error, iterations, evaluations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from mjwrap.mjcf.file_inertias import MARK
 from mjwrap.osim.description.functions import Array
 from mjwrap.osim.report import APPROXIMATED, EXACT, Report
 from mjwrap.osim.writing.document import Document
@@ -12,13 +13,14 @@ from mjwrap.osim.writing.inertias import Written
 from mjwrap.osim.writing.skeleton import Skeleton
 
 JOINTS = int(mujoco.mjtEq.mjEQ_JOINT)
+UNIT = "of the mass matrix's diagonal"
 
 
 def report_inertias(document: Document, report: Report, skeleton: Skeleton) -> None:
     """Report every body; where principal moments were changed, also the largest change of the reduced mass matrix.
 
-    That is relative to its largest element, at the default pose. The numeric "mjwrap_inertia_BODY" keeps the principal
-    moments of the file: written into `model.body_inertia` after compilation they undo the change.
+    That is relative to its diagonal, at the default pose. The numeric "mjwrap_inertia_BODY" keeps the principal moments
+    of the file, with which `mjcf.file_inertias` undoes the change; not for a body to which mass was added.
     """
     changed = {name: written for name, written in skeleton.inertias.items() if written.original is not None}
     model = document.compile() if changed else None
@@ -41,12 +43,15 @@ def _report_changed(document: Document, report: Report, body: str, written: Writ
     now = properties.principal()[0]
     moments = f"principal moments {_listed(original)} -> {_listed(now)} kg m^2"
     if float(np.abs(now - original).max()) <= 1e-12 * float(np.abs(now).max()) and written.mass_added == 0.0:
-        report.add("Body", body, EXACT, f"{moments}: changed by rounding only", effect, "of the mass matrix")
+        report.add("Body", body, EXACT, f"{moments}: changed by rounding only", effect, UNIT)
         return
     why = "massless" if written.mass_added > 0.0 else "its inertia is not physical"
     mass = f"mass + {written.mass_added:.3g} kg, " if written.mass_added > 0.0 else ""
-    document.numeric(f"mjwrap_inertia_{body}", original)
-    report.add("Body", body, APPROXIMATED, f"{why}: {mass}{moments}", effect, "of the mass matrix")
+    undone = ""
+    if written.mass_added == 0.0 and float(original.min()) > 0.0:
+        document.numeric(f"{MARK}{body}", original)
+        undone = "; mjwrap restores the file's in the compiled model, MuJoCo alone does not"
+    report.add("Body", body, APPROXIMATED, f"{why}: {mass}{moments}{undone}", effect, UNIT)
 
 
 def _listed(moments: Array) -> str:
@@ -54,7 +59,7 @@ def _listed(moments: Array) -> str:
 
 
 def _effect(model: mujoco.MjModel, body: str, written: Written) -> float:
-    """Return the largest change of the reduced mass matrix by one body's change, as a share of its largest element."""
+    """Return the largest change of the reduced mass matrix M by one body's change; of M_ij relative to √(M_ii M_jj)."""
     index = model.body(body).id
     after = _reduced_mass(model)
     inertia, mass = model.body_inertia[index].copy(), float(model.body_mass[index])
@@ -62,8 +67,9 @@ def _effect(model: mujoco.MjModel, body: str, written: Written) -> float:
     model.body_mass[index] = mass - written.mass_added
     before = _reduced_mass(model)
     model.body_inertia[index], model.body_mass[index] = inertia, mass
-    largest = float(np.abs(before).max(initial=0.0))
-    return float(np.abs(after - before).max(initial=0.0)) / largest if largest > 0.0 else 0.0
+    diagonal = np.sqrt(np.maximum(np.diag(before), 0.0))
+    sizes = np.outer(diagonal, diagonal)
+    return float((np.abs(after - before)[sizes > 0.0] / sizes[sizes > 0.0]).max(initial=0.0))
 
 
 def _reduced_mass(model: mujoco.MjModel) -> Array:

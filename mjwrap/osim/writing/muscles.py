@@ -14,6 +14,7 @@ from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.laws import WrittenLaw, law_of, refusal
 from mjwrap.osim.writing.piece_algebra import flattened
 from mjwrap.osim.writing.routes import Route, RouteWriter
+from mjwrap.osim.writing.stable_step import PathLine
 from mjwrap.osim.writing.unique_names import UniqueNames
 
 DISABLED = "it applies no force in the file"
@@ -21,7 +22,10 @@ Pull = Muscle | Ligament | PathSpring | PathActuator
 
 
 class MuscleWriter:
-    """Writes all forces along paths into a document; `default_activations` has one number for each state written."""
+    """Writes all forces along paths into a document.
+
+    `default_activations` has one number for each state written, `lines` the muscles and the sites of their paths.
+    """
 
     def __init__(self, document: Document, report: Report, routes: RouteWriter) -> None:
         self._document, self._report, self._routes = document, report, routes
@@ -32,6 +36,7 @@ class MuscleWriter:
         self._tuples = UniqueNames(document, "tuple", section="custom")
         self._labels = 0
         self.default_activations: list[float] = []
+        self.lines: list[PathLine] = []
 
     def write(self, pull: Pull) -> None:
         """Write one force along a path, and its entries in the report."""
@@ -49,8 +54,10 @@ class MuscleWriter:
             self._driven(pull.name, route, law, pull.control_range)
         else:
             self._passive(pull.name, route, law)
-        if isinstance(pull, Muscle) and law.own_states:
-            self.default_activations += [float(pull.parameters.get("default_activation", 0.0)), 0.0]
+        if isinstance(pull, Muscle):
+            self.lines.append(PathLine(pull, tuple(route.sites)))
+            if law.own_states:
+                self.default_activations += [float(pull.parameters.get("default_activation", 0.0)), 0.0]
         outcome = APPROXIMATED if law.remarks else EXACT
         self._report.add(kind, pull.name, outcome, "; ".join([f"law {law.name}", *law.remarks]))
 
