@@ -14,7 +14,7 @@ import math
 from mjwrap.kernels.compilation.jit import from_python, jit
 from mjwrap.kernels.optimization import cholesky, lu
 from mjwrap.kernels.optimization.line_search import step_length
-from mjwrap.kernels.optimization.problem import NON_FINITE, NOT_CONVERGED, SOLVED
+from mjwrap.kernels.optimization.problem import NON_FINITE, NOT_CONVERGED, SOLVED, entry
 
 TOLERANCE = 1e-13  # of a residual over the sum of its terms, where a frame ends
 ENOUGH = 1e-11  # of the same, if no step makes it smaller
@@ -23,12 +23,12 @@ SMALL_PIVOT = 1e-10  # share of a diagonal element below which `lu.py` replaces 
 
 
 @from_python
-def solve_frames(pattern, frames, objective, results, work, begin, end):
-    """Solve the frames begin to end − 1, each from the last one's dual; the first from zero."""
-    for t in range(begin, end):
+def solve_frames(pattern, frames, objective, results, work):
+    """Solve all frames, each from the last one's dual; the first from zero."""
+    for t in range(results.status.shape[0]):
         dual = results.dual[t]
         for i in range(dual.shape[0]):
-            warm = t > begin and results.status[t - 1] == SOLVED
+            warm = t > 0 and results.status[t - 1] == SOLVED
             dual[i] = results.dual[t - 1, i] if warm else 0.0
         status, count = SOLVED, 0
         if _scale(pattern, frames, objective, t, work):
@@ -43,9 +43,10 @@ def solve_frames(pattern, frames, objective, results, work, begin, end):
 def _scale(pattern, frames, objective, t, work):
     """Write A / ρ and b / ρ of frame t; return whether they are finite."""
     total = 0.0
-    for e in range(pattern.row.shape[0]):
-        work.scaled[e] = frames.entries[t, e] * objective.stiffness[pattern.row[e]]
-        total += abs(work.scaled[e])
+    for m in range(objective.weights.shape[0]):
+        for e in range(pattern.start[m], pattern.start[m + 1]):
+            work.scaled[e] = entry(pattern, frames, t, m, e) * objective.stiffness[pattern.row[e]]
+            total += abs(work.scaled[e])
     for i in range(objective.stiffness.shape[0]):
         work.load[i] = frames.wanted[t, i] * objective.stiffness[i]
         total += abs(work.load[i])
@@ -62,7 +63,7 @@ def _write(pattern, frames, t, results, work):
         a = min(max(work.target[m], frames.low[t, m]), frames.high[t, m])
         activation[m] = a
         for e in range(pattern.start[m], pattern.start[m + 1]):
-            reserve[pattern.row[e]] -= frames.entries[t, e] * a
+            reserve[pattern.row[e]] -= entry(pattern, frames, t, m, e) * a
 
 
 @jit

@@ -7,6 +7,7 @@ With y the multipliers of the constraints over ρ, c a column of A / ρ: y = r /
 from __future__ import annotations
 
 from mjwrap.kernels.compilation.jit import from_python
+from mjwrap.kernels.optimization.problem import entry
 
 
 @from_python
@@ -28,7 +29,7 @@ def _balance_residual(pattern, frames, objective, results, t, sums, sizes):
         sums[i], sizes[i] = reserve - wanted, abs(reserve) + abs(wanted)
     for m in range(objective.weights.shape[0]):
         for e in range(pattern.start[m], pattern.start[m + 1]):
-            moment = frames.entries[t, e] * results.activation[t, m]
+            moment = entry(pattern, frames, t, m, e) * results.activation[t, m]
             sums[pattern.row[e]] += moment
             sizes[pattern.row[e]] += abs(moment)
     for i in range(rows):
@@ -49,7 +50,7 @@ def _stationarity_residual(pattern, frames, objective, results, t):
         size = abs(pull)
         for e in range(pattern.start[m], pattern.start[m + 1]):
             i = pattern.row[e]
-            part = objective.stiffness[i] * frames.entries[t, e] * results.dual[t, i]
+            part = objective.stiffness[i] * entry(pattern, frames, t, m, e) * results.dual[t, i]
             pull -= part
             size += abs(part)
         outside = max(low - a, a - high, 0.0)

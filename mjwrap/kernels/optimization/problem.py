@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mjwrap.kernels.array_types import FloatRows, Floats, Ints
+from mjwrap.kernels.array_types import FloatRows, Floats, FloatStacks, Ints
+from mjwrap.kernels.compilation.jit import inlined
 
 SOLVED, NOT_CONVERGED, NON_FINITE = 0, 1, 2
 
@@ -18,14 +19,16 @@ class Pattern(NamedTuple):
 
     start: Ints  # (n + 1,) where each muscle's entries begin
     row: Ints  # (z,) row of each entry, ascending for each muscle, in the order of elimination
+    column: Ints  # (z,) the same, in the order of `Frames.moment_arms`
     first: Ints  # (k,) the first row that is coupled with each row by a muscle
 
 
 class Frames(NamedTuple):
     """The numbers of all frames."""
 
-    entries: FloatRows  # (T, z) of the moment matrix [N m], [N]
-    wanted: FloatRows  # (T, k) b
+    moment_arms: FloatStacks  # (T, n, k) [m], [-]
+    strength: FloatRows  # (T, n) active force at activation 1 [N]; times the moment arms, the transpose of A
+    wanted: FloatRows  # (T, k) b, in the order of elimination
     low: FloatRows  # (T, n)
     high: FloatRows  # (T, n)
 
@@ -58,5 +61,11 @@ class Work(NamedTuple):
     step: Floats  # (k,) of the dual
     target_step: Floats  # (n,)
     hessian: FloatRows  # (k, k)
-    matrix: FloatRows  # (n + k, n + k + 1); a smaller one may be given where `lu.py` is not wanted
+    matrix: FloatRows  # (n + k, n + k + 1)
     free: Ints  # (n,)
+
+
+@inlined
+def entry(pattern, frames, t, m, e):
+    """Return entry e of the moment matrix, which belongs to muscle m, in frame t [N m], [N]."""
+    return frames.moment_arms[t, m, pattern.column[e]] * frames.strength[t, m]
