@@ -148,6 +148,8 @@ def elimination_order(used: NDArray[np.bool_]) -> Ints:
     crossing = used.astype(np.int64)
     i, j = np.nonzero(crossing.T @ crossing)
     given = np.arange(used.shape[1], dtype=np.int64)
+    if not len(i):
+        return given
     coupled = csr_array((np.ones(len(i)), (i, j)), shape=(len(given), len(given)))
     tried = [given, given[::-1], reverse_cuthill_mckee(coupled, symmetric_mode=True).astype(np.int64)]
 
