@@ -24,7 +24,7 @@ def random_programs(
 ) -> Programs:
     """Return frames of one sparse moment matrix: each muscle crosses one to four neighbouring coordinates.
 
-    load: times moments that activations up to 0.5 give, with a fifth of noise; weight_orders: orders of magnitude of weights.
+    load: times moments that activations up to 0.5 give, with a fifth of noise; weight_orders: the weights' range.
     """
     rng = np.random.default_rng(seed)
     arms = np.zeros((muscles, rows))
@@ -70,7 +70,7 @@ def by_daqp(programs: Programs, t: int) -> Array | None:
 
 
 def by_least_squares(programs: Programs, t: int) -> Array:
-    """Return the activations of a frame by SciPy's bounded-variable least squares (Stark and Parker), without A's sparsity."""
+    """Return the activations of a frame by SciPy's bounded-variable least squares (Stark and Parker)."""
     matrix = moment_matrix(programs, t) / programs.reserves[:, None]
     whole = np.vstack([matrix, np.diag(np.sqrt(programs.weights))])
     right = np.r_[programs.wanted[t] / programs.reserves, np.zeros(len(programs.weights))]

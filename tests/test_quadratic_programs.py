@@ -196,12 +196,12 @@ def newton_matrix(seed, muscles=20, rows=8):
             for e in range(pattern.start[m], pattern.start[m + 1])
         ]
     )
-    return given, pattern, matrix, scaled
+    return pattern, matrix, scaled
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_both_linear_solvers_equal_a_dense_one(seed):
-    given, pattern, matrix, scaled = newton_matrix(seed)
+    pattern, matrix, scaled = newton_matrix(seed)
     rng = np.random.default_rng(seed)
     free = np.sort(rng.choice(20, 11, replace=False)).astype(np.int64)
     weights = 10.0 ** rng.uniform(-1, 1, 20)

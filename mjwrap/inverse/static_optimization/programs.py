@@ -128,7 +128,7 @@ def used_entries(moment_arms: Array) -> NDArray[np.bool_]:
 
 
 def make_pattern(used: NDArray[np.bool_]) -> tuple[Pattern, Ints]:
-    """Return the pattern of moment matrices, and the order of elimination (k,), from which moment arms (n, k) are used."""
+    """Return the pattern of moment matrices with some moment arms (n, k), and the order of elimination (k,)."""
     rows = used.shape[1]
     order = elimination_order(used)
     muscle, row = np.nonzero(used[:, order])

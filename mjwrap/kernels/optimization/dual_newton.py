@@ -1,10 +1,11 @@
 """Newton's method on the dual of the problem in `problem.py`.
 
-With y the multipliers of the constraints over ρ and c_m the muscles' columns of A / ρ, the optimum is a = clip(z, low, high)
-with z_m = c_mᵀ y / w_m, and y solves y + Σ c_m a_m = b / ρ: as many equations as moments, piecewise linear, the gradient of a convex
-function. A step of Newton's method keeps the muscles that are at a bound; where the dual function would rise along a step,
-`line_search.py` shortens it. So every frame ends after finitely many steps, but for rounding. y and z are both kept
-and changed by increments: z computed anew from a large y would lose digits by cancellation.
+With y the multipliers of the constraints over ρ and c_m the muscles' columns of A / ρ, the optimum is
+a = clip(z, low, high) with z_m = c_mᵀ y / w_m, and y solves y + Σ c_m a_m = b / ρ: as many equations as moments,
+piecewise linear, the gradient of a convex function. A step of Newton's method keeps the muscles at a bound that are
+there; where the dual function would rise along a step, `line_search.py` shortens it. So but for rounding every frame
+ends after finitely many steps. y and z are both kept and changed by increments: z computed anew from a large y would
+lose digits by cancellation.
 """
 
 from __future__ import annotations

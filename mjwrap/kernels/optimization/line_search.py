@@ -1,6 +1,6 @@
 """How far to go along a Newton step on the dual.
 
-The dual function is convex and piecewise quadratic along a step, so its derivative is an increasing function, piecewise linear.
+The dual function is convex and piecewise quadratic along a step: its derivative is piecewise linear and increases.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def derivative(weights, low, high, target, target_step, at_start, square, t):
 def step_length(weights, low, high, target, target_step, at_start, square):
     """Return the share of a step to take, at most 1; arguments as of `derivative`, at_start < 0.
 
-    Taken is the whole step if the dual function falls all along it, and else a share where its derivative is almost zero.
+    It is the whole step if the dual function falls all along it, and else a share where its derivative is small.
     """
     left, right, t = 0.0, 1.0, 1.0
     for _ in range(MAX_EVALUATIONS):

@@ -1,7 +1,7 @@
 """The linear system of a Newton step where H is too ill-conditioned to factorise: free muscles and dual together.
 
-With g = c / √w the system [I, −Gᵀ; G, I] has singular values √(1 + σ²), whose squares are those of H = I + G Gᵀ: half of
-the digits that H loses are kept. Gauss elimination with partial pivoting.
+With g = c / √w the system [I, −Gᵀ; G, I] has singular values √(1 + σ²), whose squares are those of H = I + G Gᵀ: it
+loses half as many digits as H. Gauss elimination with partial pivoting.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mjwrap.kernels.compilation.jit import jit
 
 @jit
 def solve_augmented(pattern, scaled, weights, free, count, right, matrix, solution):
-    """Write the solution (k,) of H x = right, from the system over the muscles free[:count]; return whether it exists."""
+    """Write the solution (k,) of H x = right over the muscles free[:count]; return whether there is one."""
     start, row, rows = pattern.start, pattern.row, right.shape[0]
     size = count + rows
     for i in range(size):
@@ -42,7 +42,7 @@ def solve_augmented(pattern, scaled, weights, free, count, right, matrix, soluti
 
 @jit
 def _eliminate(matrix, size):
-    """Bring the first `size` columns to upper triangular form, with the right-hand side in the next; False if singular."""
+    """Bring `size` columns to upper triangular form, and the right-hand side behind them; False if singular."""
     for k in range(size):
         best = k
         for i in range(k + 1, size):

@@ -1,7 +1,7 @@
 """How far activations and reserves are from optimal: the Karush–Kuhn–Tucker conditions of `problem.py`, scaled.
 
-With y the multipliers of the constraints over ρ, c a column of A / ρ: y = r / ρ; w a − cᵀy = 0 where a is between its bounds,
-≥ 0 at the lower and ≤ 0 at the upper one. Every condition is divided by the sum of the sizes of its terms.
+With y the multipliers of the constraints over ρ, c a column of A / ρ: y = r / ρ; w a − cᵀy = 0 where a is between its
+bounds, ≥ 0 at the lower and ≤ 0 at the upper one. Every condition is divided by the sum of the sizes of its terms.
 """
 
 from __future__ import annotations

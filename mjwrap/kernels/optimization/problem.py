@@ -1,7 +1,7 @@
 """The groups of arrays of the optimisation of muscle activations, and its statuses.
 
-In every frame: minimise Σ w a² + Σ (r / ρ)² subject to A a + r = b and low ≤ a ≤ high, with n activations a, and k moments
-b and reserves r. The moment matrix A is sparse: a muscle crosses few joints.
+In every frame: minimise Σ w a² + Σ (r / ρ)² subject to A a + r = b and low ≤ a ≤ high, with n activations a, and k
+moments b and reserves r. The moment matrix A is sparse: a muscle crosses few joints.
 """
 
 from __future__ import annotations
