@@ -37,6 +37,7 @@ def random_programs(
     noise = 0.2 * np.abs(meant).mean() * rng.normal(size=(frames, rows))
     return Programs(
         moment_arms=np.tile(arms, (frames, 1, 1)),
+        force=np.zeros((frames, muscles)),
         strength=np.tile(strength, (frames, 1)),
         wanted=load * (meant + noise),
         weights=10.0 ** rng.uniform(-weight_orders / 2, weight_orders / 2, muscles),

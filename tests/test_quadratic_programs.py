@@ -25,7 +25,7 @@ def one(arms, strength, wanted, *, weights=None, reserve=1.0, low=None, high=Non
     arms = np.asarray(arms, dtype=float)[None]
     n, k = arms.shape[1:]
     return whole.Programs(
-        arms, np.asarray(strength, dtype=float)[None], np.asarray(wanted, dtype=float)[None],
+        arms, np.zeros((1, n)), np.asarray(strength, dtype=float)[None], np.asarray(wanted, dtype=float)[None],
         np.ones(n) if weights is None else np.asarray(weights, dtype=float),
         np.full(k, reserve) if np.ndim(reserve) == 0 else np.asarray(reserve, dtype=float),
         (np.zeros(n) if low is None else np.asarray(low, dtype=float))[None],
@@ -150,7 +150,14 @@ def test_nothing_to_do_and_no_muscle():
     assert solve(one(np.zeros((2, 0)), np.ones(2), np.zeros(0))).status[0] == SOLVED
 
 
-@pytest.mark.parametrize("field", ["moment_arms", "strength", "wanted"])
+def test_forces_at_zero_activation_are_subtracted():
+    given = random_programs([9], 3, 12, 5)
+    force = np.random.default_rng(9).uniform(-50.0, 200.0, (3, 12))
+    moved = replace(given, force=force, wanted=given.wanted + np.einsum("tnk,tn->tk", given.moment_arms, force))
+    np.testing.assert_allclose(solve(moved).activation, solve(given).activation, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("field", ["moment_arms", "force", "strength", "wanted"])
 def test_numbers_that_are_not_finite_are_a_status(field):
     given = random_programs([3], 4, 6, 3)
     values = getattr(given, field).copy()

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from mjwrap.kernels.optimization.dual_newton import solve_frames
 from mjwrap.kernels.optimization.feasibility import prove_infeasible
 from mjwrap.kernels.optimization.optimality import optimality_residuals
-from mjwrap.kernels.optimization.pattern import mark_used
+from mjwrap.kernels.optimization.pattern import mark_used, subtract_forces
 from mjwrap.kernels.optimization.problem import (
     NOT_CONVERGED,
     SOLVED,
@@ -33,12 +33,13 @@ ACCEPTED = 1e-10  # scaled residual of the optimality conditions up to which a f
 
 @dataclass(frozen=True, eq=False)
 class Programs:
-    """For each of T frames: minimise Σ w a² + Σ (r / ρ)² subject to A a + r = b and low ≤ a ≤ high.
+    """For each of T frames: minimise Σ w a² + Σ (r / ρ)² subject to Rᵀ (F₀ + a F₁) + r = τ and low ≤ a ≤ high.
 
     Attributes:
-        moment_arms: (T, n, k) [m], [-].
-        strength: (T, n) force of each muscle at activation 1 [N]; times its moment arms, a column of A.
-        wanted: (T, k) b.
+        moment_arms: (T, n, k) R [m], [-].
+        force: (T, n) F₀ of each muscle, its force at activation 0 [N].
+        strength: (T, n) F₁, what its force grows by to activation 1 [N].
+        wanted: (T, k) τ [N m], [N].
         weights: (n,) w > 0.
         reserves: (k,) ρ > 0; infinite for a reserve without cost.
         low: (T, n) least activations.
@@ -46,6 +47,7 @@ class Programs:
     """
 
     moment_arms: Array
+    force: Array
     strength: Array
     wanted: Array
     weights: Array
@@ -92,10 +94,9 @@ def solve(programs: Programs, jobs: int = 1) -> Optima:
 
     def run(begin: int) -> None:
         part = slice(begin, begin + CHUNK)
-        given = Frames(
-            programs.moment_arms[part], programs.strength[part], wanted[part],
-            programs.low[part], programs.high[part],
-        )  # fmt: skip
+        missing, arms = wanted[part], programs.moment_arms[part]
+        subtract_forces(pattern, arms, programs.force[part], missing)
+        given = Frames(arms, programs.strength[part], missing, programs.low[part], programs.high[part])
         found = Results(*(array[part] for array in results))
         solve_frames(pattern, given, objective, found, _work(len(pattern.row), muscles, rows))
         optimality_residuals(pattern, given, objective, found, residual[part], np.zeros(rows), np.zeros(rows))
