@@ -73,7 +73,7 @@ def set_coordinates(model: mujoco.MjModel, data: mujoco.MjData, values: Mapping[
         joint = _joint(model, name)
         function = None if joint >= 0 else functions[name]
         if function is not None and function.own:
-            qpos[model.jnt_qposadr[function.joint]] = _solved(model, qpos, name, function, value)
+            qpos[model.jnt_qposadr[function.joint]] = solved_position(model, qpos, name, function, value)
         elif joint >= 0 and joint not in couplings.leader:
             qpos[model.jnt_qposadr[joint]] = value
     couplings.place(qpos)
@@ -131,7 +131,7 @@ def _number(name: str, value: object) -> float:
     return float(value)  # pyright: ignore[reportArgumentType]
 
 
-def _solved(
+def solved_position(
     model: mujoco.MjModel, qpos: Array, name: str, function: CoordinateFunction, value: float
 ) -> float:
     """Return the position of the joint that shows a coordinate."""
