@@ -153,7 +153,9 @@ def test_nothing_to_do_and_no_muscle():
 def test_forces_at_zero_activation_are_subtracted():
     given = random_programs([9], 3, 12, 5)
     force = np.random.default_rng(9).uniform(-50.0, 200.0, (3, 12))
-    moved = replace(given, force=force, wanted=given.wanted + np.einsum("tnk,tn->tk", given.moment_arms, force))
+    moved = replace(
+        given, force=force, wanted=given.wanted + np.einsum("tnk,tn->tk", given.moment_arms, force)
+    )
     np.testing.assert_allclose(solve(moved).activation, solve(given).activation, rtol=0, atol=1e-11)
 
 

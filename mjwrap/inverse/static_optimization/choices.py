@@ -17,7 +17,11 @@ Array = NDArray[np.float64]
 
 
 def positive_by_name(
-    given: ArrayLike | Mapping[str, float], names: Sequence[str], what: str, noun: str, unbounded: bool = False
+    given: ArrayLike | Mapping[str, float],
+    names: Sequence[str],
+    what: str,
+    noun: str,
+    unbounded: bool = False,
 ) -> Array:
     """Return a positive number for each name (n,); `StateError` if they are not positive or name what is not there.
 
@@ -28,9 +32,7 @@ def positive_by_name(
         found = np.ones(len(names))
         for key, value in given.items():
             places = _matching(key, names, what, noun)
-            found[places] = validation.positive(
-                value, f"{what}[{key!r}]", StateError, unbounded=unbounded
-            )
+            found[places] = validation.positive(value, f"{what}[{key!r}]", StateError, unbounded=unbounded)
         return found
     values = validation.numbers(given, what, StateError)
     if values.shape not in ((), (len(names),)):
@@ -52,9 +54,7 @@ def _matching(key: object, names: Sequence[str], what: str, noun: str) -> list[i
     fit = [i for i, name in enumerate(names) if name == key]
     fit = fit or [i for i, name in enumerate(names) if fnmatch.fnmatchcase(name, key)]
     if not fit:
-        raise StateError(
-            f"{what}: no {noun} '{key}'{nearest(key, names)}; {noun}s: {listed(names)}"
-        )
+        raise StateError(f"{what}: no {noun} '{key}'{nearest(key, names)}; {noun}s: {listed(names)}")
     return fit
 
 

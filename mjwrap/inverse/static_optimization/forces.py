@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import StateError
 from mjwrap.inverse.muscle_analysis import MuscleAnalysis
 from mjwrap.inverse.static_optimization.programs import CHUNK, in_threads
-from mjwrap.kernels.musculotendon.dispatch import MILLARD, PASSIVE, THELEN, has_fiber
+from mjwrap.kernels.musculotendon.dispatch import DEGROOTE_FREGLY, MILLARD, PASSIVE, THELEN, has_fiber
 from mjwrap.kernels.musculotendon.fiber import ELASTIC, HEIGHT, MIN_ACTIVATION, OPTIMAL, SLACK
 from mjwrap.kernels.musculotendon.tangent import tangents
 from mjwrap.system import MuscleSystem
@@ -18,7 +18,7 @@ from mjwrap.system import MuscleSystem
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 TENDONS = ("model", "rigid")
-PENNATIONS = ("fiber", "normalized")
+PENNATIONS = ("fiber", "opensim")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,27 +84,27 @@ def muscle_forces(
     rest, strength = analysis.passive_force.copy(), analysis.active_force.copy()
     if not passive:
         rest[:, ~np.isin(law, PASSIVE)] = 0.0
-    if pennation == "normalized":
-        strength *= _normalized_pennation(law, params, analysis.length)
+    if pennation == "opensim":
+        strength *= _opensim_pennation(law, params, analysis.length)
     least = np.where(fiber, params[:, MIN_ACTIVATION], 0.0)
     return Forces(law, params, analysis.length, analysis.velocity, rest, strength, curved, least)
 
 
-def _normalized_pennation(law: NDArray[np.int64], params: Array, length: Array) -> Array:
-    """Return by what OpenSim's active force along the tendon differs (T, n): cos φ(l / l_o) over cos φ(l).
+def _opensim_pennation(law: NDArray[np.int64], params: Array, length: Array) -> Array:
+    """Return OpenSim's active force along the tendon over the right one (T, n), with a rigid tendon.
 
-    The pennation angle of its Millard muscles is taken at the fibre length in optimal lengths, as if that were metres
-    (github.com/opensim-org/opensim-core/issues/4390).
+    Its Millard muscles have their pennation angle at the fibre length in optimal lengths, as if that were metres
+    (github.com/opensim-org/opensim-core/issues/4390); those of De Groote and Fregly have none.
     """
     factor = np.ones_like(length)
-    some = np.flatnonzero((law == MILLARD) & (params[:, HEIGHT] > 0.0))
+    some = np.flatnonzero(np.isin(law, (MILLARD, DEGROOTE_FREGLY)) & (params[:, HEIGHT] > 0.0))
     height, optimal = params[some, HEIGHT], params[some, OPTIMAL]
     along = np.maximum(length[:, some] - params[some, SLACK], 0.0)
     fiber = np.hypot(along, height)
-    sine = np.minimum(height * optimal / fiber, 1.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.sqrt(1.0 - sine * sine) * fiber / along
-    factor[:, some] = np.where(along > 0.0, ratio, 1.0)
+    sine = np.where(law[some] == MILLARD, np.minimum(height * optimal / fiber, 1.0), 0.0)
+    factor[:, some] = np.divide(
+        np.sqrt(1.0 - sine * sine) * fiber, along, out=np.ones_like(along), where=along > 0.0
+    )
     return factor
 
 

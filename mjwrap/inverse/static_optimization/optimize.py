@@ -35,9 +35,9 @@ SETTLED = 1e-9  # largest change of an activation with which relinearising ends
 MAX_ROUNDS = 60
 CAREFUL_ROUNDS = 20  # after which an activation goes only half of the way
 
-# The habits of OpenSim's StaticOptimization: options of `static_optimization`. Its accelerations are those of natural
-# splines: `Motion(..., ends="natural")`.
-OPENSIM_PARITY: dict[str, Any] = {"passive": False, "tendon": "rigid", "pennation": "normalized"}
+# The habits of OpenSim's StaticOptimization as options of `static_optimization`; docs/static_optimization.md has that of
+# its accelerations.
+OPENSIM_PARITY: dict[str, Any] = {"passive": False, "tendon": "rigid", "pennation": "opensim"}
 
 
 def static_optimization(
@@ -60,7 +60,8 @@ def static_optimization(
     about the independent coordinates, F the tensions, r the reserves, τ the generalised forces of `inverse_dynamics`. F
     is affine in a with a rigid tendon. With an elastic one, and with Thelen's force-velocity curve, it is not: the
     optimisation is repeated with F linearised at its result until no activation changes by more than 1e-9. A tendon
-    cannot push: where a damped fibre would, the least activation is that from which it pulls.
+    cannot push: where a damped fibre would, its tension is zero, at its least activation, or its activation is more than
+    that from which it pulls.
 
     Args:
         muscles: of the model that moves. A smaller activation than the least one of a law counts as that, so it is
@@ -76,8 +77,8 @@ def static_optimization(
             in either case.
         bounds: least and largest activation within 0 and 1: numbers, or arrays (n,) or (T, n).
         tendon: "model", or "rigid" for all; the active force is then the activation times that at activation 1.
-        pennation: of Millard muscles, at the fibre length: "fiber"; or "normalized", OpenSim's error of taking it at
-            the length in optimal lengths.
+        pennation: "fiber"; or "opensim", with the pennation angles that OpenSim's static optimisation takes in error:
+            at the length in optimal lengths for Millard's muscles, 0 for those of De Groote and Fregly.
         jobs: threads, None for all cores; results do not depend on how many.
 
     Returns:
@@ -174,11 +175,14 @@ def _result(
             f"by {abs(change[t, m]):.1e} after {MAX_ROUNDS} linearisations"
         )
     for t in np.flatnonzero(found.status != SOLVED):
-        reasons[t] = f"the optimum was found to {found.residual[t]:.1e} of its conditions only, not {ACCEPTED:g}"
-    tension = np.maximum(used.force + found.activation * used.strength, 0.0)
+        reasons[t] = (
+            f"the optimum was found to {found.residual[t]:.1e} of its conditions only, not {ACCEPTED:g}"
+        )
+    idle = (used.low > given.low) & (found.activation <= used.low)
+    tension = np.where(idle, 0.0, np.maximum(used.force + found.activation * used.strength, 0.0))
     return StaticOptimization(
         time=analysis.time, names=analysis.names, coordinates=analysis.coordinates,
-        activation=found.activation, tension=tension, reserve=found.reserve, moment=given.wanted,
+        activation=np.where(idle, given.low, found.activation), tension=tension, reserve=found.reserve, moment=given.wanted,
         optimal_reserve=given.reserves, moment_arm=analysis.moment_arm, solved=np.array([not reason for reason in reasons]),
         reasons=tuple(reasons), residual=found.residual,
         saturated=(found.activation >= given.high) & (used.strength > 0.0),
