@@ -36,6 +36,15 @@ from .fitting import fit_elliptic_cylinder as fit_elliptic_cylinder
 from .fitting import fit_sphere as fit_sphere
 from .fitting import fit_torus as fit_torus
 from .fitting import mesh_points as mesh_points
+from .inverse import OPENSIM_PARITY as OPENSIM_PARITY
+from .inverse import ExternalForce as ExternalForce
+from .inverse import ExternalLoads as ExternalLoads
+from .inverse import Motion as Motion
+from .inverse import MuscleAnalysis as MuscleAnalysis
+from .inverse import StaticOptimization as StaticOptimization
+from .inverse import inverse_dynamics as inverse_dynamics
+from .inverse import muscle_analysis as muscle_analysis
+from .inverse import static_optimization as static_optimization
 from .mjcf import insert_xml as insert_xml
 from .mjcf import muscle_xml as muscle_xml
 from .mjcf import set_laws as set_laws

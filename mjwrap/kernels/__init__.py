@@ -8,6 +8,7 @@ Rooms, from the top; each may import those below it (`lint-imports` checks that)
     wraps                      one obstacle between two points
     tangency                   path error and its Jacobian (`path_error.py`), Newton's method, certificate
     geometry | musculotendon   surfaces, geodesics, a segment's clearance (`clearance.py`) | activation, fibre, tendon
+    optimization               muscle activations that meet given moments
     compilation                how kernels are compiled and linked, and where their machine code is kept
     array_types                the types of arrays in named groups
     layout                     the columns of a path's rows

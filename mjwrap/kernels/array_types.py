@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 Floats = Annotated[NDArray[np.float64], types.float64[::1]]  # (n,)
 FloatRows = Annotated[NDArray[np.float64], types.float64[:, ::1]]  # (n, columns)
+FloatStacks = Annotated[NDArray[np.float64], types.float64[:, :, ::1]]  # (n, rows, columns)
 Ints = Annotated[NDArray[np.int64], types.int64[::1]]
 IntRows = Annotated[NDArray[np.int64], types.int64[:, ::1]]
 Indices = Annotated[NDArray[np.int32], types.int32[::1]]  # MuJoCo's own

@@ -9,6 +9,8 @@ simulation these are soft constraints; here the follower is set exactly. A follo
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -71,9 +73,12 @@ class CoupledJoints:
         return list(dict.fromkeys(found))
 
     def place(self, qpos: Array) -> None:
-        """Set the followers in a pose qpos (nq,) to the positions given by their leaders, in place [m or rad]."""
+        """Set the followers to the positions given by their leaders, in place [m or rad].
+
+        qpos: a pose (nq,), or a column for each of several (nq, T).
+        """
         for level in self._levels:
-            qpos[level.qpos_at] = level.rest + level.value(qpos)
+            qpos[level.qpos_at] = level.resting(qpos) + level.value(qpos)
 
     def residuals(self, qpos: Array) -> dict[int, float]:
         """Return how far each follower in a pose qpos (nq,) is from where its leaders put it, by joint [m or rad]."""
@@ -84,22 +89,33 @@ class CoupledJoints:
         return found
 
     def spread(self, qpos: Array, tangent: Array) -> None:
-        """Set the followers' rows of a derivative d(pose)/dx (nv,) or (nv, m), in place, from their leaders' rows.
+        """Set the followers' rows of a derivative d(pose)/dx, in place, from their leaders' rows.
 
-        qpos (nq,): the pose of the derivative, with the followers in place.
+        qpos: the pose (nq,), with the followers in place, and tangent (nv,) or (nv, m); or a column for each of several
+        poses (nq, T), and tangent (nv, T) or (nv, T, m).
         """
         for level in self._levels:
-            slope = level.slope(qpos)
-            led = level.led(tangent)
-            tangent[level.dof_at] = (slope if tangent.ndim == 1 else slope[:, None]) * led
+            tangent[level.dof_at] = _aligned(level.slope(qpos), tangent) * level.led(tangent)
+
+    def accelerate(self, qpos: Array, qvel: Array, qacc: Array) -> None:
+        """Set the followers' accelerations [m/s², rad/s²], in place, from their leaders' motion.
+
+        q̈ = f″(x) ẋ² + f′(x) ẍ, with the leaders' x. Columns as of `spread`: qpos (nq, T), qvel and qacc (nv, T); the
+        followers' positions and velocities are in place.
+        """
+        for level in self._levels:
+            bent = level.curvature(qpos) * level.led(qvel) ** 2
+            qacc[level.dof_at] = bent + level.slope(qpos) * level.led(qacc)
 
     def matrix(self, qpos: Array) -> Array:
         """Return N = ∂q/∂q_independent (nv, k) at a pose qpos (nq,); columns as in `independent`.
 
-        Forces τ (nv,) act on the independent degrees of freedom as Nᵀτ; velocities are v = N v_independent.
+        Forces τ (nv,) act on the independent degrees of freedom as Nᵀτ; velocities are v = N v_independent. Of several
+        poses, a column for each (nq, T), the matrices are (nv, T, k).
         """
-        found = np.zeros((self._nv, len(self.independent)))
-        found[self.independent, np.arange(len(self.independent))] = 1.0
+        count = len(self.independent)
+        found = np.zeros((self._nv, *qpos.shape[1:], count))
+        found[self.independent, ..., np.arange(count)] = 1.0
         self.spread(qpos, found)
         return found
 
@@ -127,14 +143,19 @@ class _Level:
         self._leader_rest = model.qpos0[self._leader_at]
         self._every = np.arange(len(couplings))
 
+    def resting(self, qpos: Array) -> Array:
+        """Return the followers' positions at rest, with the axes of qpos."""
+        return _aligned(self.rest, qpos)
+
     def _x(self, qpos: Array) -> tuple[Array, Array]:
-        """Return x − x₀ of each coupling, and the coefficients (5, couplings) of its piece."""
+        """Return x − x₀ of each coupling, and the coefficients (5, couplings) of its piece; qpos as of `place`."""
         at = qpos[self._leader_at]
-        x = _summed((at - self._leader_rest) * self._weight)
+        weight = _aligned(self._weight, at)
+        x = _summed((at - _aligned(self._leader_rest, at)) * weight)
         if not len(self._knots):
-            return x, self._c[:, 0]
-        piece = np.count_nonzero(self._knots <= _summed(at * self._weight), axis=0)
-        return x, self._c[:, piece, self._every]
+            return x, _aligned(self._c[:, 0], x[None])
+        piece = np.count_nonzero(_aligned(self._knots, at) <= _summed(at * weight), axis=0)
+        return x, self._c[:, piece, _aligned(self._every, piece)]
 
     def value(self, qpos: Array) -> Array:
         """Return Σ cᵢ xⁱ of each coupling."""
@@ -146,10 +167,20 @@ class _Level:
         x, c = self._x(qpos)
         return c[1] + x * (2.0 * c[2] + x * (3.0 * c[3] + x * 4.0 * c[4]))
 
+    def curvature(self, qpos: Array) -> Array:
+        """Return Σ i (i − 1) cᵢ xⁱ⁻² of each coupling."""
+        x, c = self._x(qpos)
+        return 2.0 * c[2] + x * (6.0 * c[3] + x * 12.0 * c[4])
+
     def led(self, tangent: Array) -> Array:
         """Return the weighted sum of the leaders' rows of a derivative, 0 without a leader."""
-        weight = self._weight if tangent.ndim == 1 else self._weight[..., None]
-        return _summed(weight * tangent[self._leader_dof])
+        rows = tangent[self._leader_dof]
+        return _summed(_aligned(self._weight, rows) * rows)
+
+
+def _aligned(values: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
+    """Return values with axes of length 1 behind their own, so that they have as many axes as another array."""
+    return values.reshape(values.shape + (1,) * (other.ndim - values.ndim))
 
 
 def _summed(terms: Array) -> Array:

@@ -206,33 +206,39 @@ def solve_routes(first, end, routes, poses, paths, tol):
 
 
 @jit
+def measure_muscle(m, first, routes, info, length, velocity, status):
+    """Do what `measure_muscles` does for muscle m, whose first route is given; return the next muscle's first route."""
+    c = first
+    code, known = lay.CONVERGED, True
+    total, speed = 0.0, 0.0
+    while c < routes.rows.shape[0] and routes.rows[c, R_MUSCLE] == m:
+        here = int(info[c, lay.I_STATUS])
+        if not has_valid_length(here, info[c, lay.I_ERROR]):
+            code, known = here if known else code, False
+        elif code == lay.CONVERGED:
+            code = here
+        c += 1
+    if known:
+        code = -code
+        for r in range(first, c):
+            total += routes.weights[r] * info[r, lay.I_LENGTH]
+            speed += routes.weights[r] * info[r, lay.I_SPEED]
+        if math.isfinite(speed):
+            length[m] = total
+            velocity[m] = speed
+        else:
+            code = lay.NON_FINITE
+    status[m] = code
+    return c
+
+
+@jit
 def measure_muscles(routes, info, states):
     """Turn solved routes into length [m], velocity [m/s] and status of every muscle.
 
     A muscle with a route without a path keeps its last values; its status says why. If all its missing paths have a
     substitute (`end_inside.py`), the muscle has values, and its status a minus sign.
     """
-    length, velocity, status = states.length, states.velocity, states.status
     c = 0
-    for m in range(status.shape[0]):
-        first = c
-        code, known = lay.CONVERGED, True
-        total, speed = 0.0, 0.0
-        while c < routes.rows.shape[0] and routes.rows[c, R_MUSCLE] == m:
-            here = int(info[c, lay.I_STATUS])
-            if not has_valid_length(here, info[c, lay.I_ERROR]):
-                code, known = here if known else code, False
-            elif code == lay.CONVERGED:
-                code = here
-            c += 1
-        if known:
-            code = -code
-            for r in range(first, c):
-                total += routes.weights[r] * info[r, lay.I_LENGTH]
-                speed += routes.weights[r] * info[r, lay.I_SPEED]
-            if math.isfinite(speed):
-                length[m] = total
-                velocity[m] = speed
-            else:
-                code = lay.NON_FINITE
-        status[m] = code
+    for m in range(states.status.shape[0]):
+        c = measure_muscle(m, c, routes, info, states.length, states.velocity, states.status)

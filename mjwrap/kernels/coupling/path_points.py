@@ -95,7 +95,7 @@ def choose_routes(points, qpos):
 
 
 @jit
-def _leave_out(c, routes, paths):
+def leave_out(c, routes, paths):
     """Give route c no path and no length; when it holds again it starts cold."""
     for k in range(routes.rows[c, R_LO], routes.rows[c, R_HI]):
         paths.node[k, lay.S_MODE] = lay.COLD
@@ -116,12 +116,12 @@ def solve_active_routes(points, routes, poses, paths, tol):
             c += 1
         solve_routes(first, c, routes, poses, paths, tol)
         while c < active.shape[0] and active[c] == 0:
-            _leave_out(c, routes, paths)
+            leave_out(c, routes, paths)
             c += 1
 
 
 @jit
-def _slope_of_length(u, uses, slopes, routes, paths):
+def slope_of_length(u, uses, slopes, routes, paths):
     """Return the derivative of a route's length with respect to the joint of use u, as far as the site moves by it."""
     c, node, a = uses[u, U_ROUTE], uses[u, U_NODE], uses[u, U_AXIS]
     x, y, z = slopes[a, S_FIRST], slopes[a, S_FIRST + 1], slopes[a, S_FIRST + 2]
@@ -144,7 +144,7 @@ def add_point_speeds(points, routes, qvel, paths):
     for u in range(uses.shape[0]):
         c = uses[u, U_ROUTE]
         if has_valid_length(info[c, lay.I_STATUS], info[c, lay.I_ERROR]):
-            slope = _slope_of_length(u, uses, points.slopes, routes, paths)
+            slope = slope_of_length(u, uses, points.slopes, routes, paths)
             info[c, lay.I_SPEED] += slope * qvel[uses[u, U_DOF]]
 
 
@@ -158,14 +158,14 @@ def write_point_forces(points, routes, paths, tension):
         c = uses[u, U_ROUTE]
         pull = routes.weights[c] * tension[routes.rows[c, R_MUSCLE]]
         if pull != 0.0:
-            force[uses[u, U_DOF]] -= pull * _slope_of_length(u, uses, points.slopes, routes, paths)
+            force[uses[u, U_DOF]] -= pull * slope_of_length(u, uses, points.slopes, routes, paths)
 
 
 @jit
 def add_point_row(u, muscle, uses, slopes, routes, paths, row):
     """Add to dl/dq of a muscle, row (nv,), what its moving sites add; u: its first use. Return the next muscle's."""
     while u < uses.shape[0] and routes.rows[uses[u, U_ROUTE], R_MUSCLE] == muscle:
-        row[uses[u, U_DOF]] += routes.weights[uses[u, U_ROUTE]] * _slope_of_length(
+        row[uses[u, U_DOF]] += routes.weights[uses[u, U_ROUTE]] * slope_of_length(
             u, uses, slopes, routes, paths
         )
         u += 1

@@ -91,6 +91,16 @@ def fiberless_tension(law, params, m, activation, length, speed):
 
 
 @jit
+def fiberless_force_parts(law, params, m, activation, length, speed):
+    """Return active and passive tension [N] of a law without a fibre, before it is kept from pushing."""
+    if law == MUJOCO:
+        return mujoco_muscle.force_parts(params, m, activation, length, speed)
+    if law == PATH_ACTUATOR:
+        return path_actuator.tension(params, m, activation), 0.0
+    return 0.0 * activation, fiberless_tension(law, params, m, activation, length, speed)
+
+
+@jit
 def fiberless_energy(law, params, m, length):
     """Return the energy [J] that a law without a fibre stores at a length [m]."""
     if law == LIGAMENT:

@@ -65,13 +65,20 @@ def fiber_force(law, params, m, activation, fiber, fiber_speed):
 @jit
 def _along_fiber(law, params, m, activation, fiber, fiber_speed):
     """Return the fibre force along the fibre [N]; arguments as of `fiber_force`."""
+    active, elastic, damped = _parts_along_fiber(law, params, m, activation, fiber, fiber_speed)
+    return params[m, F_MAX] * (active + elastic + damped)
+
+
+@jit
+def _parts_along_fiber(law, params, m, activation, fiber, fiber_speed):
+    """Return the active, the passive elastic and the damping force along the fibre [F_max]; see `fiber_force`."""
     optimal = params[m, OPTIMAL]
     v = fiber_speed / (params[m, V_MAX] * optimal)
     curves = curve_set(law, params, m)
     active, _, passive, _ = length_curves(curves, fiber / optimal)
     activation = held_activation(params, m, activation)
     speed, _, _ = velocity_force(curves, activation, v)
-    return params[m, F_MAX] * (activation * active * speed + passive + params[m, DAMPING] * v)
+    return activation * active * speed, passive, params[m, DAMPING] * v
 
 
 @jit
@@ -104,6 +111,22 @@ def rigid_tension(law, params, m, activation, length, speed):
     fiber = rigid_fiber(params, m, length)
     cosine = along / fiber
     return max(cosine * _along_fiber(law, params, m, activation, fiber, speed * cosine), 0.0)
+
+
+@jit
+def rigid_force_parts(law, params, m, activation, length, speed):
+    """Return active and passive force along the tendon [N], whose sum is `rigid_tension` where that is positive.
+
+    The passive force, elastic and damping, may be negative. Both are zero where the unit is shorter than its tendon.
+    """
+    along = length - params[m, SLACK]
+    if along <= 0.0:
+        return 0.0, 0.0
+    fiber = rigid_fiber(params, m, length)
+    cosine = along / fiber
+    active, elastic, damped = _parts_along_fiber(law, params, m, activation, fiber, speed * cosine)
+    scale = cosine * params[m, F_MAX]
+    return scale * active, scale * (elastic + damped)
 
 
 @jit

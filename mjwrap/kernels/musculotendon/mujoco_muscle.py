@@ -44,11 +44,8 @@ def _scale(params, m, column):
 
 
 @jit
-def tension(params, m, activation, length, speed):
-    """Return the tension [N] of MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias`.
-
-    Where MuJoCo's actuator would push (negative activation, or a force range above zero) the tension is zero.
-    """
+def gain_and_bias(params, m, length, speed):
+    """Return gain and bias [N] of MuJoCo's force-length-velocity muscle: `mju_muscleGain`, `mju_muscleBias`."""
     gear = params[m, 12]
     force, optimal = _scale(params, m, 0)
     x = params[m, 0] + (gear * length - params[m, 9]) / max(MINVAL, optimal)
@@ -74,5 +71,22 @@ def tension(params, m, activation, length, speed):
     else:
         z = (x - b) / max(MINVAL, b - 1.0)
         bias = -force * params[m, 20] * (0.5 + z)
+    return gain, bias
+
+
+@jit
+def tension(params, m, activation, length, speed):
+    """Return the tension [N] of MuJoCo's muscle.
+
+    Where MuJoCo's actuator would push (negative activation, or a force range above zero) the tension is zero.
+    """
+    gain, bias = gain_and_bias(params, m, length, speed)
     total = min(max(gain * activation + bias, params[m, 13]), params[m, 14])
-    return max(-gear * total, 0.0)
+    return max(-params[m, 12] * total, 0.0)
+
+
+@jit
+def force_parts(params, m, activation, length, speed):
+    """Return active and passive tension [N], whose sum is `tension` where neither it nor a force range clamps it."""
+    gain, bias = gain_and_bias(params, m, length, speed)
+    return -params[m, 12] * gain * activation, -params[m, 12] * bias

@@ -1,0 +1,1 @@
+"""Kernels for many frames of a given motion."""
