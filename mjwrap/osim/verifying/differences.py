@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
+from mjwrap.osim.verifying.driven import DrivenCause, driven_cause
 from mjwrap.osim.verifying.imported import ImportedModel, ImportedNumbers
 from mjwrap.osim.verifying.opensim_paths import STEP
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference

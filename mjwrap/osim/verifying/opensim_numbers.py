@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
 from mjwrap.osim.verifying.opensim_motions import coordinate_places, opensim_motion
-from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of
+from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of, segments
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
 
 Array = NDArray[np.float64]
@@ -160,8 +160,9 @@ class _Computer:
             for name, force in self.paths.items()
             if (found := contacts(self.opensim, path_of(force), state))
         }
+        between = {name: segments(self.opensim, path_of(self.paths[name]), state) for name in wraps}
         slopes = length_slopes(model, state, self._curved, self._movable) if with_arms else {}
-        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes)
+        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes, between)
 
     def _tensions(self, muscle: Any) -> list[float | None]:
         """Return the tension of a muscle at equilibrium, at rest, at each of the activations."""
