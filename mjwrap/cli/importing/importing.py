@@ -21,7 +21,7 @@ from mjwrap.errors import OsimError
 from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.importing import Imported
 from mjwrap.osim.verifying.differences import Verification, verify
-from mjwrap.osim.verifying.opensim_numbers import compute_reference, has_opensim
+from mjwrap.osim.verifying.opensim_numbers import compute_reference, has_opensim, opensim_geodesic
 from mjwrap.osim.verifying.reference import Reference, read_reference, sha256_of
 
 
@@ -113,7 +113,7 @@ def _verify(settings: ImportSettings, out: str, known: Reference | None) -> Veri
             known.save(settings.numbers)
     model = mujoco.MjModel.from_xml_path(out)
     with contextlib.closing(progress_bar(len(known.poses), "poses", "mjwrap")) as bar:
-        return verify(model, known, progress=lambda done, count: bar.update(1))
+        return verify(model, known, lambda done, count: bar.update(1), opensim_geodesic())
 
 
 def _values(out: str, imported: Imported, found: Verification | None) -> Mapping[str, Any]:

@@ -14,6 +14,7 @@ from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.bench import simulate_muscle
 from mjwrap.osim.coordinates import coordinates, set_coordinates
 from mjwrap.osim.verifying.reference import MotionNumbers, MotionSample, PoseNumbers
+from mjwrap.osim.verifying.stops import TouchingRoute, TouchingRoutes
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -39,6 +40,7 @@ class ImportedNumbers:
     laws: dict[str, Array]  # of the same law, at OpenSim's path length
     touched: dict[str, int]  # how many surfaces the path touches
     coordinates: dict[str, float]
+    routes: list[TouchingRoute]
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,14 @@ class SampleNumbers:
     """An imported model's muscles at a state of a driven motion.
 
     missing: the largest difference between the generalised forces that OpenSim's accelerations need and those that the
-    muscles have, as a share of the largest one; NaN where OpenSim's coordinates are not the model's joints.
+    muscles have, as a share of the largest one; NaN where couplings are not the model's only constraints, or OpenSim's
+    coordinates not its joints. missing_with_theirs: the same with OpenSim's tensions along mjwrap's paths.
     """
 
     lengths: dict[str, float]
     tensions: dict[str, float]
     missing: float
+    missing_with_theirs: float
 
 
 class ImportedModel:
@@ -61,6 +65,7 @@ class ImportedModel:
         self.model = model
         self.data = mujoco.MjData(model)
         self.muscles = MuscleSystem(model)
+        self._routes = TouchingRoutes(self.muscles)
         self._joints = {model.joint(i).name: i for i in range(model.njnt)}
         own = [name for name, function in read_coordinate_functions(model).items() if function.own]
         self.settable = [*self.muscles.coordinates, *own]
@@ -80,6 +85,7 @@ class ImportedModel:
             if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
+        routes = self._routes.now()
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
         touched = {name: len(muscles.contact_points(i)) for i, name in enumerate(muscles.names)}
         arms: dict[str, dict[str, float]] = {}
@@ -99,7 +105,7 @@ class ImportedModel:
                 tensions[name] = self._tension(law, lengths[name], activations)
             laws[name] = self._tension(law, pose.lengths[name], activations)
         values, mass = coordinates(model, data), self._mass(independent)
-        return ImportedNumbers(bodies, mass, lengths, statuses, arms, tensions, laws, touched, values)
+        return ImportedNumbers(bodies, mass, lengths, statuses, arms, tensions, laws, touched, values, routes)
 
     def _tension(self, law: object, length: float, activations: list[float]) -> Array:
         """Return the tension at rest at each activation [N]."""
@@ -191,19 +197,22 @@ class ImportedModel:
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
         tensions = dict(zip(muscles.names, muscles.tension.tolist(), strict=True))
         known = [name for name in lengths if name in sample.lengths]
-        missing = self._missing(data, sample.accelerations)
-        return SampleNumbers({n: lengths[n] for n in known}, {n: tensions[n] for n in known}, missing)
+        theirs = np.array([sample.tensions.get(name, tensions[name]) for name in muscles.names])
+        missing = self._missing(data, sample.accelerations, (muscles.tension, theirs))
+        return SampleNumbers({n: lengths[n] for n in known}, {n: tensions[n] for n in known}, *missing)
 
-    def _missing(self, data: mujoco.MjData, accelerations: Mapping[str, float]) -> float:
-        """Return the share of the generalised forces that accelerations need and the muscles at their last evaluation do
-        not have, about the independent joints."""
+    def _missing(
+        self, data: mujoco.MjData, accelerations: Mapping[str, float], pulls: tuple[Array, Array]
+    ) -> tuple[float, float]:
+        """Return the share of the generalised forces about the independent joints that accelerations need and tensions
+        along the paths of the last evaluation do not have, for either of two tensions."""
         model, couplings = self.model, CoupledJoints(self.model)
         chosen = {int(model.jnt_dofadr[self._joints[n]]): accelerations.get(n) for n in self.muscles.coordinates}
         found = [chosen.get(int(dof)) for dof in couplings.independent]
-        if any(each is None for each in found):
-            return float("nan")
-        pulls = -self.muscles.length_jacobian(data).T @ self.muscles.tension
-        n = couplings.matrix(data.qpos)
+        others = data.eq_active.astype(np.bool_) & (model.eq_type != int(mujoco.mjtEq.mjEQ_JOINT))
+        if others.any() or any(each is None for each in found):
+            return float("nan"), float("nan")
+        jacobian, n = self.muscles.length_jacobian(data), couplings.matrix(data.qpos)
         beside = []
         for sign in (-1.0, 1.0):  # N changes along the motion
             qpos = data.qpos.copy()
@@ -215,9 +224,10 @@ class ImportedModel:
         mujoco.mj_forward(model, data)
         inertial = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, inertial, acceleration)
-        needed, own = n.T @ (inertial + data.qfrc_bias), n.T @ pulls
-        largest = max(float(np.abs(n.T @ data.qfrc_bias).max()), float(np.abs(own).max()))
-        return float(np.abs(needed - own).max()) / largest if largest > 0.0 else 0.0
+        needed, bias = n.T @ (inertial + data.qfrc_bias), n.T @ data.qfrc_bias
+        own, theirs = (-n.T @ jacobian.T @ tension for tension in pulls)
+        largest = max(*(float(np.abs(force).max()) for force in (bias, own, theirs)), 1e-9)
+        return float(np.abs(needed - own).max()) / largest, float(np.abs(needed - theirs).max()) / largest
 
     def _set_speeds(self, data: mujoco.MjData, speeds: Mapping[str, float]) -> None:
         """Set the speeds of the independent joints, and of those that follow them."""

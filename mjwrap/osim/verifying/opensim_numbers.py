@@ -15,6 +15,8 @@ from mjwrap.errors import OsimError
 from mjwrap.osim.verifying.opensim_motions import coordinate_places, opensim_motion
 from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of, segments
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
+from mjwrap.osim.verifying.scholz import scholz_length
+from mjwrap.osim.verifying.stops import TouchingRoute
 
 Array = NDArray[np.float64]
 ACTIVATIONS = (0.05, 0.5, 1.0)
@@ -34,6 +36,23 @@ def has_opensim() -> bool:
     except (ImportError, OSError):
         return False
     return True
+
+
+def opensim_geodesic() -> Callable[[TouchingRoute], float | None] | None:
+    """Return a function that returns the length of OpenSim's geodesic over a route's stops [m], or None where OpenSim
+    has none; None without the opensim package."""
+    if not has_opensim():
+        return None
+    opensim: Any = importlib.import_module("opensim")
+    opensim.Logger.setLevelString("off")
+
+    def length(route: TouchingRoute) -> float | None:
+        try:
+            return scholz_length(opensim, route)
+        except RuntimeError:
+            return None
+
+    return length
 
 
 def compute_reference(
