@@ -1,10 +1,10 @@
 """Replay a motion of an imported model in OpenSim, and compare coordinates, lengths and moment arms.
 
-    python benchmarks/osim/replay_motion.py MODEL.osim [--frozen FILE.json]
+    python benchmarks/osim/replay_motion.py MODEL.osim [--motion FILE.mot] [--frozen FILE.json]
 
 Needs the package opensim. The motion, seeded sines of the independent coordinates, is written as .mot and .sto; OpenSim
 reads each as a Storage and as a TimeSeriesTable, and its MuscleAnalysis runs along it. Printed: largest differences.
---frozen keeps OpenSim's lengths and moment arms at the motion for the tests.
+--motion takes the motion that `mjwrap run --motion` wrote instead. --frozen keeps OpenSim's lengths and moment arms at the motion for the tests.
 """
 
 import argparse
@@ -35,16 +35,28 @@ def motion(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     return time, np.array(rows)
 
 
+def written(model: mujoco.MjModel, file: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and positions of a written motion; joints that follow others are put in place, as OpenSim does."""
+    table, data = mw.read_table(file), mujoco.MjData(model)
+    names = mw.MuscleSystem(model).coordinates
+    rows = []
+    for k in range(len(table.time)):
+        mw.osim.set_coordinates(model, data, {name: float(table[name][k]) for name in names})
+        rows.append(data.qpos.copy())
+    return table.time, np.array(rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("model", type=Path)
+    parser.add_argument("--motion", type=Path)
     parser.add_argument("--frozen", type=Path)
     options = parser.parse_args()
     opensim.Logger.setLevelString("off")
     model = mw.import_osim(options.model).spec.compile()
-    time, qpos = motion(model)
+    time, qpos = motion(model) if options.motion is None else written(model, options.motion)
     table = motion_table(model, time, qpos)
     with tempfile.TemporaryDirectory() as folder:
         for suffix in (".mot", ".sto"):

@@ -13,113 +13,17 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 import opensim  # pyright: ignore[reportMissingImports]
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 import mjwrap as mw
-from mjwrap.kernels import layout
-from mjwrap.kernels.coupling import muscle_paths
+from mjwrap.osim.verifying.scholz import scholz_length
+from mjwrap.osim.verifying.stops import TouchingRoutes
 
-Array = NDArray[np.float64]
 CLOSE = 1e-9  # [m]
-
-
-@dataclass(frozen=True)
-class Stop:
-    """A stop of a path in the world: a point, or a surface with its pose and a hint in its frame."""
-
-    pos: Array
-    surface: Any = None
-    turn: Array | None = None
-    hint: Array | None = None
-
-
-def shape(stop: Stop, body: Any) -> Any:
-    """Return the contact geometry of a stop's surface."""
-    origin = opensim.Vec3(*stop.pos)
-    angles = Rotation.from_matrix(stop.turn).as_euler("XYZ")
-    turn, surface = opensim.Vec3(*angles), stop.surface
-    if isinstance(surface, mw.Cylinder):
-        return opensim.ContactCylinder(surface.radius, origin, turn, body)
-    if isinstance(surface, mw.Sphere):
-        frame = opensim.PhysicalOffsetFrame(body, opensim.Transform())
-        frame.set_translation(origin)
-        return opensim.ContactSphere(surface.radius, origin, body)
-    if isinstance(surface, mw.Ellipsoid):
-        return opensim.ContactEllipsoid(opensim.Vec3(*surface.radii), origin, turn, body)
-    if isinstance(surface, mw.Torus):
-        return opensim.ContactTorus(surface.major_radius, surface.minor_radius, origin, turn, body)
-    raise NotImplementedError(f"OpenSim's path has no {type(surface).__name__}")
-
-
-def scholz_length(stops: list[Stop]) -> float:
-    """Return the length of OpenSim's path over the stops [m]; `RuntimeError` where it throws."""
-    model = opensim.Model()
-    ground = model.getGround()
-    path = opensim.Scholz2015GeometryPath()
-    path.setName("path")
-    for k, stop in enumerate(stops):
-        if stop.surface is None:
-            path.appendPathPoint(ground, opensim.Vec3(*stop.pos))
-            continue
-        geometry = shape(stop, ground)
-        geometry.setName(f"surface{k}")
-        model.addContactGeometry(geometry)
-        hint = np.zeros(3) if stop.hint is None else stop.hint
-        path.appendObstacle(geometry, opensim.Vec3(*hint))
-    model.addComponent(path)
-    state = model.initSystem()
-    model.realizePosition(state)
-    return float(path.getLength(state))
-
-
-class Paths:
-    """The stops of the routes of a model's muscles at the last evaluated pose."""
-
-    def __init__(self, muscles: mw.MuscleSystem) -> None:
-        self.muscles = muscles
-        self.surfaces = [
-            node.surface for m in muscles.declarations for route in m.routes for node in route.nodes
-        ]
-
-    def touching(self) -> list[tuple[str, float, list[Stop]]]:
-        """Return name, length and stops of every route that touches a surface and is converged."""
-        plan, state = self.muscles._plan, self.muscles._last
-        node, poses = state.paths.node, state.scratch
-        found = []
-        for c, route in enumerate(plan.routes):
-            info = state.paths.info[c]
-            if info[layout.I_STATUS] != layout.CONVERGED or not route[muscle_paths.R_SURFACES]:
-                continue
-            rows = node[route[muscle_paths.R_LO] : route[muscle_paths.R_HI]]
-            touched = rows[:, layout.S_MODE] == layout.TOUCHED
-            if not (touched & (rows[:, layout.KIND] != layout.VIA)).any():
-                continue
-            stops = [Stop(self._site(poses, route[muscle_paths.R_FROM]))]
-            for k, row in enumerate(rows):
-                place = row[layout.POS : layout.POS + 3].copy()
-                if row[layout.KIND] == layout.VIA:
-                    stops.append(Stop(place))
-                elif touched[k]:
-                    turn = row[layout.ROT : layout.ROT + 9].reshape(3, 3).copy()
-                    first = stops[0].pos
-                    ends = [row[w : w + 3] + first for w in (layout.W_P, layout.W_Q)]
-                    middle = turn.T @ (0.5 * (ends[0] + ends[1]) - place)
-                    stops.append(Stop(place, self.surfaces[route[muscle_paths.R_LO] + k], turn, middle))
-            stops.append(Stop(self._site(poses, route[muscle_paths.R_TO])))
-            name = self.muscles.names[int(route[muscle_paths.R_MUSCLE])]
-            found.append((name, float(info[layout.I_LENGTH]), stops))
-        return found
-
-    def _site(self, poses: mujoco.MjData, site: int) -> Array:
-        return poses.site_xpos[site].copy()
 
 
 def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int, list[str]]:
@@ -132,21 +36,24 @@ def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int
     names = muscles.coordinates
     rng = np.random.default_rng(seed)
     count, lines = 0, []
-    paths = Paths(muscles)
+    paths = TouchingRoutes(muscles)
     for k in range(poses):
         mujoco.mj_resetData(model, data)
         mw.osim.set_coordinates(model, data, {name: draw(model, name, rng) for name in names})
         mujoco.mj_forward(model, data)
         muscles.reset(data)
         muscles.forward(data)
-        for name, length, stops in paths.touching():
+        for route in paths.now():
+            name, length = route.muscle, route.length
             count += 1
             try:
-                theirs = scholz_length(stops)
+                theirs = scholz_length(opensim, route)
             except RuntimeError as error:
                 lines.append(f"  {name}, pose {k}: OpenSim: {' '.join(str(error).split())[:100]}")
                 continue
-            if not abs(theirs - length) <= CLOSE:
+            if theirs is None:
+                lines.append(f"  {name}, pose {k}: OpenSim has no such path, or a length that is no number")
+            elif not abs(theirs - length) <= CLOSE:
                 lines.append(
                     f"  {name}, pose {k}: {length:.9f} m, OpenSim {theirs:.9f} m ({length - theirs:+.2e})"
                 )

@@ -27,7 +27,7 @@ import scholz_lengths
 
 import mjwrap as mw
 from mjwrap.osim.verifying.differences import verify
-from mjwrap.osim.verifying.opensim_numbers import compute_reference
+from mjwrap.osim.verifying.opensim_numbers import compute_reference, opensim_geodesic
 from mjwrap.osim.verifying.reference import read_reference
 
 COLUMNS = {  # heads of the table by the beginning of a quantity's name
@@ -57,7 +57,7 @@ def row(path: Path, poses: int, geodesics: int, cache: Path | None) -> dict[str,
     with tempfile.TemporaryDirectory() as folder:
         imported.save(Path(folder) / "model.xml")
         model = mujoco.MjModel.from_xml_path(str(Path(folder) / "model.xml"))
-    found = verify(model, reference)
+    found = verify(model, reference, geodesic=opensim_geodesic())
     for head, begin in COLUMNS.items():
         largest = [q.largest for q in found.quantities if q.what.startswith(begin)]
         cells[head] = f"{largest[0]:.1e}" if largest else ""

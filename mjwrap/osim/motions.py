@@ -8,8 +8,35 @@ from numpy.typing import ArrayLike
 
 from mjwrap import validation
 from mjwrap.errors import StateError
+from mjwrap.files.atomic import PartFile
 from mjwrap.files.table import Table
+from mjwrap.files.writing import RowWriter
 from mjwrap.osim.coordinates import coordinates
+
+
+_HEADER = {"header": "Coordinates", "inDegrees": "no"}
+
+
+class MotionFile:
+    """Write the coordinates of every sample of a run to a .mot or .sto file, as `motion_table` does."""
+
+    def __init__(self, output: PartFile, model: mujoco.MjModel) -> None:
+        self._output, self._model = output, model
+        self._names = list(coordinates(model, mujoco.MjData(model)))
+        with output.writing():
+            self._writer = RowWriter(output.open_text(), output.path.suffix, self._names, _HEADER)
+
+    def log(self, data: mujoco.MjData) -> None:
+        """Write the present coordinates."""
+        values = coordinates(self._model, data)
+        with self._output.writing():
+            self._writer.add(data.time, [values[name] for name in self._names])
+
+    def close(self) -> None:
+        """Complete the file and give it its name."""
+        with self._output.writing():
+            self._writer.finish()
+        self._output.publish()
 
 
 def motion_table(model: mujoco.MjModel, time: ArrayLike, qpos: ArrayLike) -> Table:
@@ -42,4 +69,4 @@ def motion_table(model: mujoco.MjModel, time: ArrayLike, qpos: ArrayLike) -> Tab
         rows.append(coordinates(model, data))
     names = list(coordinates(model, data))
     values = np.array([[row[name] for name in names] for row in rows]).reshape(len(times), len(names))
-    return Table(times, tuple(names), values, {"header": "Coordinates", "inDegrees": "no"})
+    return Table(times, tuple(names), values, _HEADER)

@@ -158,6 +158,12 @@ def add_analysis(add: Callable[..., object]) -> None:
     )
 
 
+def add_motion(add: Callable[..., object]) -> None:
+    """Add the option --motion; add: the add_argument of a parser or group."""
+    add("--motion", metavar="FILE.mot", help="write the coordinates of an imported model as a motion that OpenSim "
+        "replays, named as in its .osim file, in rad and m (.mot, .sto)")  # fmt: skip
+
+
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option --json, whose file name may be left out."""
     parser.add_argument(

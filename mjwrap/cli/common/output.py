@@ -50,6 +50,11 @@ def open_analysis(path: str) -> PartFile:
     return open_output(path, "--analysis", ".sto")
 
 
+def open_motion(path: str) -> PartFile:
+    """Open the file of --motion, as `open_output` does."""
+    return open_output(path, "--motion", ".mot", ".sto")
+
+
 def opened(make: Callable[[], Kept]) -> Kept:
     """Return the file, recording or film that `make` opens; raises `UserError` if it cannot be written."""
     try:

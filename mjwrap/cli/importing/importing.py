@@ -20,7 +20,7 @@ from mjwrap.mjcf import read_model
 from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.importing import Imported
 from mjwrap.osim.verifying.differences import Verification, verify
-from mjwrap.osim.verifying.opensim_numbers import compute_reference, has_opensim
+from mjwrap.osim.verifying.opensim_numbers import compute_reference, has_opensim, opensim_geodesic
 from mjwrap.osim.verifying.reference import Reference, read_reference, sha256_of
 from mjwrap.osim.writing.skeleton import CLAMPED
 from mjwrap.text import counted
@@ -120,7 +120,7 @@ def _verify(settings: ImportSettings, out: str, known: Reference | None) -> Veri
             known.save(settings.numbers)
     model = read_model(out)
     with contextlib.closing(progress_bar(len(known.poses), "poses", "mjwrap")) as bar:
-        return verify(model, known, progress=lambda done, count: bar.update(1))
+        return verify(model, known, lambda done, count: bar.update(1), opensim_geodesic())
 
 
 def _values(out: str, imported: Imported, found: Verification | None) -> Mapping[str, Any]:

@@ -26,6 +26,7 @@ from mjwrap.cli.common.arguments import (
     RECORDING_DETAILS,
     add_analysis,
     add_json,
+    add_motion,
     add_recording,
     add_serving,
     add_side_rule,
@@ -64,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="quantities in the table, as for mjwrap run (default %(default)s)",
     )
     add_analysis(states.add_argument)
+    add_motion(states.add_argument)
     add_json(parser, "write the contents of FILE")
 
 
@@ -79,7 +81,7 @@ def settings(options: argparse.Namespace) -> ReplaySettings:
     for option in (
         ()
         if is_table
-        else ("model", "keyframe", "side_rule", "record", "connect", *RECORDING_DETAILS, "out", "analysis")
+        else ("model", "keyframe", "side_rule", "record", "connect", *RECORDING_DETAILS, "out", "analysis", "motion")
     ):
         if getattr(options, option):
             raise UserError(
@@ -116,11 +118,11 @@ def _states(options: argparse.Namespace) -> StatesSettings:
         raise UserError(f"'{options.file}' is a table of states: name its model with --model")
     if options.columns != COLUMNS and not options.out:
         raise UserError("--columns needs a table: add --out")
-    kept = options.record or options.out or options.analysis or options.connect
+    kept = options.record or options.out or options.analysis or options.motion or options.connect
     if kept and options.serve:
         raise UserError(
-            "--serve cannot be combined with --record, --connect, --out or --analysis; to see a written recording, "
-            "replay it"
+            "--serve cannot be combined with --record, --connect, --out, --analysis or --motion; to see a written "
+            "recording, replay it"
         )
     # without an output and without --info or --json, a recording is made for the viewer
     recorded = bool(options.record or options.connect) or not (kept or options.info or options.json)
@@ -132,4 +134,5 @@ def _states(options: argparse.Namespace) -> StatesSettings:
         table=options.out,
         kinds=read_kinds(options.columns),
         analysis=options.analysis,
+        motion=options.motion,
     )

@@ -14,7 +14,7 @@ class StatesSettings:
 
     model: a file or a model by name. keyframe: gives the values that the table lacks, None for qpos0. side_rule: as for
     `MuscleSystem`. table: a file for the quantities named in `kinds`, or None. analysis: the prefix of tables in
-    OpenSim's layout, or None.
+    OpenSim's layout, or None. motion: a file of coordinates that OpenSim replays, or None.
     """
 
     model: str
@@ -24,11 +24,12 @@ class StatesSettings:
     table: str | None = None
     kinds: Sequence[str] = ()
     analysis: str | None = None
+    motion: str | None = None
 
     @property
     def kept(self) -> bool:
         """Whether a file is written or a viewer connected."""
-        return bool(self.recording.wanted or self.table or self.analysis)
+        return bool(self.recording.wanted or self.table or self.analysis or self.motion)
 
 
 @dataclass(frozen=True)

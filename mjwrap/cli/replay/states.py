@@ -10,7 +10,7 @@ import numpy as np
 
 from mjwrap import MuscleSystem, read_table
 from mjwrap.cli.common.errors import RUN_FAILED
-from mjwrap.cli.common.output import Report, open_analysis, open_output
+from mjwrap.cli.common.output import Report, open_analysis, open_motion, open_output
 from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.progress import progress_bar
 from mjwrap.cli.common.recorded import open_recorder
@@ -18,6 +18,7 @@ from mjwrap.cli.common.stopping import Interrupt
 from mjwrap.cli.replay.settings import StatesSettings
 from mjwrap.files import SUFFIXES
 from mjwrap.files.atomic import uninterrupted
+from mjwrap.osim.motions import MotionFile
 from mjwrap.runs.models import load, start_keyframe, start_state
 from mjwrap.runs.muscle_analysis_tables import MuscleAnalysisTables
 from mjwrap.runs.run_table import RunTableFile
@@ -65,7 +66,10 @@ def recompute(
     report.say(f"{file}: {counted(done, 'state')} of {settings.model}, {span}")
     for line in (*states.remarks, *(f"{name}: {why}" for name, why in without.items())):
         report.say(f"  {line}")
-    asked = {"recording": settings.recording.path, "table": settings.table, "analysis": settings.analysis}
+    asked = {
+        "recording": settings.recording.path, "table": settings.table, "analysis": settings.analysis,
+        "motion": settings.motion,
+    }  # fmt: skip
     files = outputs.completed({what: path for what, path in asked.items() if path})
     for what, path in files.items():
         report.say(f"{what + ':':10s} {path}")
@@ -92,6 +96,9 @@ def open_outputs(
     if settings.analysis:
         analysis = MuscleAnalysisTables(settings.analysis, model, muscles, open_analysis)
         outputs.add("analysis", analysis.log, analysis.close)
+    if settings.motion:
+        motion = MotionFile(open_motion(settings.motion), model)
+        outputs.add("motion", motion.log, motion.close)
     recorded = settings.recording if recording is None else replace(settings.recording, path=recording)
     if recorded.wanted:
         recorder = open_recorder(recorded, model, muscles, stack)

@@ -29,6 +29,7 @@ from mjwrap.cli.common.arguments import (
     add_analysis,
     add_json,
     add_model,
+    add_motion,
     add_recording,
     add_serving,
     joint_position,
@@ -126,6 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files("--columns", default=COLUMNS, metavar="KINDS", help="quantities in the tables, separated by "
         f"commas: {', '.join(KINDS)} (default {COLUMNS})")  # fmt: skip
     add_analysis(files)
+    add_motion(files)
     add_json(parser, "write the settings, the speed and the problems of the run")
 
 
@@ -155,6 +157,7 @@ def settings(options: argparse.Namespace) -> RunCommandSettings:
         table=options.out,
         kinds=read_kinds(options.columns),
         analysis=options.analysis,
+        motion=options.motion,
     )
     run_settings = RunSettings(
         duration=options.duration,

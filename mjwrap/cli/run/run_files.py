@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mjwrap.cli.common.figures import need_matplotlib
-from mjwrap.cli.common.output import open_analysis, open_output, opened
+from mjwrap.cli.common.output import open_analysis, open_motion, open_output, opened
 from mjwrap.cli.common.outputs import Outputs
 from mjwrap.cli.common.recorded import RecordingSettings, open_recorder
 from mjwrap.files import SUFFIXES
+from mjwrap.osim.motions import MotionFile
 from mjwrap.runs.engine import Engine, PluginEngine
 from mjwrap.runs.muscle_analysis_tables import MuscleAnalysisTables
 from mjwrap.runs.plot_history import PlotHistory
@@ -43,7 +44,8 @@ class FilmSettings:
 class OutputSettings:
     """The output files of a run; None for files that were not asked for.
 
-    kinds: the quantities in the tables (csv and table). analysis: the prefix of tables in OpenSim's layout.
+    kinds: the quantities in the tables (csv and table). analysis: the prefix of tables in OpenSim's layout. motion: a
+    file of coordinates that OpenSim replays.
     """
 
     recording: RecordingSettings
@@ -53,6 +55,7 @@ class OutputSettings:
     table: str | None = None
     kinds: Sequence[str] = DEFAULT_KINDS
     analysis: str | None = None
+    motion: str | None = None
 
     @property
     def files(self) -> dict[str, str]:
@@ -64,6 +67,7 @@ class OutputSettings:
             "csv": self.csv,
             "table": self.table,
             "analysis": self.analysis,
+            "motion": self.motion,
         }
         return {what: path for what, path in places.items() if path}
 
@@ -90,6 +94,9 @@ def open_outputs(
     if settings.analysis:
         analysis = MuscleAnalysisTables(settings.analysis, model, muscles, open_analysis)
         outputs.add("analysis", analysis.log, analysis.close)
+    if settings.motion:
+        motion = MotionFile(open_motion(settings.motion), model)
+        outputs.add("motion", motion.log, motion.close)
     if settings.recording.wanted:
         recorder = open_recorder(settings.recording, model, muscles, stack)
         outputs.add("recording", recorder.log, recorder.close)

@@ -10,21 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
+from mjwrap.osim.verifying.driven import driven_cause
 from mjwrap.osim.verifying.imported import ImportedModel, ImportedNumbers
-from mjwrap.osim.verifying.opensim_paths import STEP
+from mjwrap.osim.verifying.reasons import LARGE, UNEXPLAINED, Geodesic, arm_reason, length_reason
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference
 
 Array = NDArray[np.float64]
-LARGE = 1e-3  # [m] a difference of length or moment arm that needs a reason
-RELATIVE = 1e-2  # the same of a tension, as a share of the larger one
-BENT = 0.02  # sine of the angle at which a straight line meets a surface, from which a path is not taut
-TURN, JUMP = (
-    1e-2,
-    1e-4,
-)  # [rad] a rotation that needs a reason; [m] a change of length over 1e-4 rad that is a jump
+RELATIVE = 1e-2  # a difference of a tension, as a share of the larger one, that needs a reason
+TURN = 1e-2  # [rad] a rotation that needs a reason
 LOSS = 1e-3  # [J] change of a passive motion's energy that disproves the motion
-SHORT_ARC = 1e-6  # [m] an arc shorter than its chord by more is wrong
-UNEXPLAINED = "not explained"
 
 
 @dataclass(frozen=True)
@@ -94,10 +88,12 @@ def verify(
     model: mujoco.MjModel,
     reference: Reference,
     progress: Callable[[int, int], object] | None = None,
+    geodesic: Geodesic | None = None,
 ) -> Verification:
     """Compare an imported model, compiled, with OpenSim's numbers of the same file.
 
-    progress: called with the number of poses done and that of all.
+    progress: called with the number of poses done and that of all. geodesic: returns the length of another program's
+    geodesic over the stops of a route, or None; it judges between paths that differ.
     """
     imported = ImportedModel(model)
     every = {
@@ -124,7 +120,7 @@ def verify(
             found.missing.append(f"pose {k}: {error}")
             continue
         _compare_bodies(every, found, pose, ours, k)
-        _compare_paths(every, found, imported, pose, ours, k)
+        _compare_paths(every, found, imported, pose, ours, k, geodesic)
         if progress is not None:
             progress(k + 1, len(reference.poses))
     for name, motion in (("passive motion", reference.passive), ("driven motion", reference.driven)):
@@ -198,6 +194,7 @@ def _compare_paths(
     pose: PoseNumbers,
     ours: ImportedNumbers,
     k: int,
+    geodesic: Geodesic | None,
 ) -> None:
     for name, theirs in pose.lengths.items():
         mine = ours.lengths.get(name)
@@ -205,21 +202,20 @@ def _compare_paths(
             continue
         touches = ours.touched[name] > 0 or name in pose.wraps
         every["wrapped" if touches else "straight"].add(mine - theirs, f"{name}, pose {k}")
+        reason = ""
         if not abs(mine - theirs) <= LARGE:
-            found.differences.append(
-                Difference("length", name, k, theirs, mine, "m", _reason(name, pose, ours, mine - theirs))
-            )
+            reason = length_reason(name, pose, ours, mine - theirs, geodesic)
+            found.differences.append(Difference("length", name, k, theirs, mine, "m", reason))
         for coordinate, arm in pose.moment_arms.get(name, {}).items():
             if coordinate not in ours.moment_arms[name]:
                 continue
             own = ours.moment_arms[name][coordinate]
             every["wrapped arm" if touches else "arm"].add(own - arm, f"{name} about {coordinate}, pose {k}")
             if not abs(own - arm) <= LARGE:
-                why = _arm_reason(name, coordinate, arm, own, pose) or _reason(
-                    name, pose, ours, mine - theirs
-                )
+                why = arm_reason(name, coordinate, arm, own, pose)
+                reason = reason or length_reason(name, pose, ours, mine - theirs, geodesic)
                 about = f"{name} about {coordinate}"
-                found.differences.append(Difference("moment arm", about, k, arm, own, "m", why))
+                found.differences.append(Difference("moment arm", about, k, arm, own, "m", why or reason))
     for name, law in ours.laws.items():
         strongest = float(getattr(imported.muscles[name].parameters, "max_isometric_force", 0.0))
         if strongest <= 0.0:
@@ -238,45 +234,6 @@ def _compare_paths(
                         "tension", where, k, tension, float(law[i]), "N", f"{UNEXPLAINED}: same length"
                     )
                 )
-
-
-def _reason(name: str, pose: PoseNumbers, ours: ImportedNumbers, gap: float) -> str:
-    """Return why mjwrap's path is longer than OpenSim's by `gap` [m], as far as it can be seen."""
-    contacts = pose.wraps.get(name, {})
-    short = {o: chord - arc for o, (arc, chord, _) in contacts.items() if arc < chord - SHORT_ARC}
-    if short:
-        return f"OpenSim's arc is shorter than its own chord on {', '.join(short)}"
-    if name in ours.statuses:
-        return f"mjwrap has no path: {ours.statuses[name]}"
-    bent = {o: numbers[2] for o, numbers in contacts.items() if numbers[2] > BENT}
-    if bent:
-        which = ", ".join(
-            f"{o} at {np.degrees(np.arcsin(min(sine, 1.0))):.1f} degrees" for o, sine in bent.items()
-        )
-        return f"OpenSim's path is not taut: its straight line meets {which}, where a string is tangent"
-    for coordinate, sides in pose.slopes.get(name, {}).items():
-        jump = max(map(abs, sides)) * STEP
-        if jump > JUMP:
-            return f"OpenSim's length jumps by {1e3 * jump:.2f} mm as {coordinate} moves by {STEP:g}"
-    if contacts and not ours.touched[name]:
-        return f"OpenSim wraps {', '.join(contacts)}; the geodesic has lifted off"
-    if ours.touched[name] and not contacts:
-        return "the geodesic touches a surface that OpenSim's path does not wrap"
-    if ours.touched[name] != len(contacts):
-        return f"the geodesic touches {ours.touched[name]} surfaces, OpenSim's path {len(contacts)}"
-    return f"{UNEXPLAINED}: the geodesic is {'longer' if gap > 0 else 'shorter'}"
-
-
-def _arm_reason(name: str, coordinate: str, arm: float, own: float, pose: PoseNumbers) -> str:
-    """Return a reason why moment arms differ that OpenSim's own lengths give, or an empty string."""
-    sides = pose.slopes.get(name, {}).get(coordinate)
-    if sides is None:
-        return ""
-    slope = -0.5 * (sides[0] + sides[1])
-    if abs(slope - arm) <= 0.5 * abs(own - arm):
-        return ""
-    near = ", and mjwrap's is" if abs(slope - own) <= LARGE else ""
-    return f"OpenSim's moment arm is not the slope of its own length{near}"
 
 
 def _compare_motion(
@@ -298,16 +255,10 @@ def _compare_motion(
             why = f"{UNEXPLAINED}: motion"
             if lost > LOSS and abs(change) < 0.01 * lost:
                 why = f"OpenSim's motion changes its energy by {lost:.2g} J, mjwrap's by {abs(change):.1g} J"
-            elif motion.excitation is not None and (off := _pulling_apart(every)):
-                why = f"{UNEXPLAINED}: motion; lengths of paths differ, too, by up to {1e3 * off:.2g} mm"
+            elif motion.excitation is not None:
+                why = driven_cause(imported, motion, motion.time[k]) or why
             place = f"{coordinate}, {motion.time[k]:g} s"
             found.differences.append(
                 Difference(name, place, 0, float(theirs[k]), float(values[k]), "rad, m", why)
             )
     every[name] = quantity
-
-
-def _pulling_apart(every: dict[str, Quantity]) -> float:
-    """Return the largest difference of a length [m] if it is one that changes a motion, else 0."""
-    largest = max(every["wrapped"].largest, every["straight"].largest)
-    return largest if largest > 1e-4 else 0.0

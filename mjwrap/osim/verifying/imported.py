@@ -14,7 +14,8 @@ from mjwrap.mjcf.coordinate_functions import read_axis_joints, read_coordinate_f
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.bench import simulate_muscle
 from mjwrap.osim.coordinates import coordinates, set_coordinates
-from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
+from mjwrap.osim.verifying.reference import MotionNumbers, MotionSample, PoseNumbers
+from mjwrap.osim.verifying.stops import TouchingRoute, TouchingRoutes
 from mjwrap.system import MuscleSystem
 from mjwrap.system.moment_arms import CoordinateMotions
 
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 # OpenSim's reference motions have gravity and, if driven, muscles. MuJoCo's other forces are switched off by these
 # flags, and springs and dampers by their constants, as couplings in pieces need a passive stage.
 DRIVEN_OFF = ("LIMIT", "CONTACT")
+MOMENT = 1e-6  # of differences of the couplings' slopes [s]
 PASSIVE_OFF = (*DRIVEN_OFF, "ACTUATION")
 SPRINGS = ("jnt_stiffness", "dof_damping", "tendon_stiffness", "tendon_damping")
 
@@ -39,6 +41,22 @@ class ImportedNumbers:
     laws: dict[str, Array]  # of the same law, at OpenSim's path length
     touched: dict[str, int]  # how many surfaces the path touches
     coordinates: dict[str, float]
+    routes: list[TouchingRoute]
+
+
+@dataclass(frozen=True)
+class SampleNumbers:
+    """An imported model's muscles at a state of a driven motion.
+
+    missing: the largest difference between the generalised forces that OpenSim's accelerations need and those that the
+    muscles have, as a share of the largest one; NaN where couplings are not the model's only constraints, or OpenSim's
+    coordinates not its joints. missing_with_theirs: the same with OpenSim's tensions along mjwrap's paths.
+    """
+
+    lengths: dict[str, float]
+    tensions: dict[str, float]
+    missing: float
+    missing_with_theirs: float
 
 
 class ImportedModel:
@@ -48,6 +66,7 @@ class ImportedModel:
         self.model = model
         self.data = mujoco.MjData(model)
         self.muscles = MuscleSystem(model)
+        self._routes = TouchingRoutes(self.muscles)
         self._joints = {model.joint(i).name: i for i in range(model.njnt)}
         self._functions = read_coordinate_functions(model)
         self._motions = CoordinateMotions(model, CoupledJoints(model))
@@ -73,6 +92,7 @@ class ImportedModel:
             if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
+        routes = self._routes.now()
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
         touched = {name: len(muscles.contact_points(i)) for i, name in enumerate(muscles.names)}
         arms = self._arms(pose, independent) if pose.moment_arms else {}
@@ -85,7 +105,7 @@ class ImportedModel:
                 tensions[name] = self._tension(law, lengths[name], activations)
             laws[name] = self._tension(law, pose.lengths[name], activations)
         values, mass = coordinates(model, data), self._mass(independent)
-        return ImportedNumbers(bodies, mass, lengths, statuses, arms, tensions, laws, touched, values)
+        return ImportedNumbers(bodies, mass, lengths, statuses, arms, tensions, laws, touched, values, routes)
 
     def _tension(self, law: object, length: float, activations: list[float]) -> Array:
         """Return the tension at rest at each activation [N]."""
@@ -170,13 +190,10 @@ class ImportedModel:
         if passive:
             free = {n: given.coordinates[n][0] for n in self.settable if n in given.coordinates}
             set_coordinates(model, data, free)
-            for name in muscles.coordinates:
-                data.qvel[model.jnt_dofadr[self._joints[name]]] = given.speeds.get(name, 0.0)
-            couplings = CoupledJoints(model)
-            data.qvel[:] = couplings.matrix(data.qpos) @ data.qvel[couplings.independent]
+            self._set_speeds(data, given.speeds)
         muscles.reset(data)
         if not passive:
-            self._start(data, given)
+            self._set_muscles(data, given.excitation, given.activation, given.fiber_length)
         mujoco.mj_forward(model, data)
         energy = float(data.energy.sum())
         rows: dict[str, list[float]] = {}
@@ -189,6 +206,60 @@ class ImportedModel:
         mujoco.mj_forward(model, data)
         change = float(data.energy.sum()) - energy if passive else float("nan")
         return {name: np.array(rows[name]) for name in given.coordinates if name in rows}, change
+
+    def at_sample(self, motion: MotionNumbers, sample: MotionSample) -> SampleNumbers:
+        """Return the muscles' numbers at a state of OpenSim's driven motion."""
+        model, muscles = self.model, self.muscles
+        data = mujoco.MjData(model)
+        values = {n: motion.coordinates[n][sample.frame] for n in self.settable if n in motion.coordinates}
+        set_coordinates(model, data, values)
+        self._set_speeds(data, sample.speeds)
+        muscles.reset(data)
+        self._set_muscles(data, motion.excitation, sample.activation, sample.fiber_length)
+        muscles.forward(data)
+        lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
+        tensions = dict(zip(muscles.names, muscles.tension.tolist(), strict=True))
+        known = [name for name in lengths if name in sample.lengths]
+        theirs = np.array([sample.tensions.get(name, tensions[name]) for name in muscles.names])
+        missing = self._missing(data, sample.accelerations, (muscles.tension, theirs))
+        return SampleNumbers({n: lengths[n] for n in known}, {n: tensions[n] for n in known}, *missing)
+
+    def _missing(
+        self, data: mujoco.MjData, accelerations: Mapping[str, float], pulls: tuple[Array, Array]
+    ) -> tuple[float, float]:
+        """Return the share of the generalised forces about the independent joints that accelerations need and tensions
+        along the paths of the last evaluation do not have, for either of two tensions."""
+        model, couplings = self.model, CoupledJoints(self.model)
+        chosen = {
+            int(model.jnt_dofadr[self._joints[n]]): accelerations.get(n) for n in self.muscles.coordinates
+        }
+        found = [chosen.get(int(dof)) for dof in couplings.independent]
+        others = data.eq_active.astype(np.bool_) & (model.eq_type != int(mujoco.mjtEq.mjEQ_JOINT))
+        if others.any() or any(each is None for each in found):
+            return float("nan"), float("nan")
+        jacobian, n = self.muscles.length_jacobian(data), couplings.matrix(data.qpos)
+        beside = []
+        for sign in (-1.0, 1.0):  # N changes along the motion
+            qpos = data.qpos.copy()
+            mujoco.mj_integratePos(model, qpos, data.qvel, sign * MOMENT)
+            beside.append(couplings.matrix(qpos))
+        change = (beside[1] - beside[0]) / (2.0 * MOMENT)
+        independent = data.qvel[couplings.independent]
+        acceleration = n @ np.array(found, dtype=np.float64) + change @ independent
+        mujoco.mj_forward(model, data)
+        inertial = np.zeros(model.nv)
+        mujoco.mj_mulM(model, data, inertial, acceleration)
+        needed, bias = n.T @ (inertial + data.qfrc_bias), n.T @ data.qfrc_bias
+        own, theirs = (-n.T @ jacobian.T @ tension for tension in pulls)
+        largest = max(*(float(np.abs(force).max()) for force in (bias, own, theirs)), 1e-9)
+        return float(np.abs(needed - own).max()) / largest, float(np.abs(needed - theirs).max()) / largest
+
+    def _set_speeds(self, data: mujoco.MjData, speeds: Mapping[str, float]) -> None:
+        """Set the speeds of the independent joints, and of those that follow them."""
+        model, couplings = self.model, CoupledJoints(self.model)
+        for name in self.muscles.coordinates:
+            data.qvel[model.jnt_dofadr[self._joints[name]]] = speeds.get(name, 0.0)
+        data.qvel[:] = couplings.matrix(data.qpos) @ data.qvel[couplings.independent]
 
     def _step(self, data: mujoco.MjData, steps: int, off: tuple[str, ...]) -> None:
         """Step with some of MuJoCo's forces switched off, by the names of their flags."""
@@ -208,16 +279,22 @@ class ImportedModel:
             for name, values in constants.items():
                 getattr(model, name)[:] = values
 
-    def _start(self, data: mujoco.MjData, given: MotionNumbers) -> None:
-        """Give the muscles OpenSim's states at the start."""
+    def _set_muscles(
+        self,
+        data: mujoco.MjData,
+        excitation: float | None,
+        activation: Mapping[str, float],
+        fiber_length: Mapping[str, float],
+    ) -> None:
+        """Give the muscles an excitation and OpenSim's states."""
         model = self.model
-        for name in given.activation:
+        for name in activation:
             actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
             if actuator < 0:
                 continue
-            data.ctrl[int(model.actuator_ctrladr[actuator])] = given.excitation
+            data.ctrl[int(model.actuator_ctrladr[actuator])] = excitation
             first, count = int(model.actuator_actadr[actuator]), int(model.actuator_actnum[actuator])
             if count > 0:
-                data.act[first] = given.activation[name]
+                data.act[first] = activation[name]
             if count > 1:
-                data.act[first + 1] = given.fiber_length[name]
+                data.act[first + 1] = fiber_length[name]

@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from mjwrap.osim.verifying.reference import MotionNumbers
+from mjwrap.osim.verifying.reference import MotionNumbers, MotionSample
 
 ACCURACY = 1e-9  # of OpenSim's integrator
 INTERVAL = 0.01  # between frames [s]
 SPREAD = 0.2  # of the start of a passive motion from the default pose [rad, m]
 SPEED = 1.0  # at most, then [rad/s, m/s]
 MOMENT = 1e-4  # of differences [s]
+SAMPLED = 5  # every so many frames of a driven motion have a sample
+SHORT = 1e-6  # of differences of lengths [s]
 
 
 def opensim_motion(
@@ -59,8 +61,8 @@ def opensim_motion(
     times = INTERVAL * np.arange(round(duration / INTERVAL) + 1)
     rows: dict[str, list[float]] = {name: [] for name in coordinates}
     speeds: dict[str, float] = {}
-    energy = []
-    for time in times:
+    energy, samples = [], []
+    for frame, time in enumerate(times):
         if time > 0.0:
             state = manager.integrate(float(time))
         model.realizeDynamics(state)
@@ -70,8 +72,39 @@ def opensim_motion(
         if time == 0.0:
             rates = state.getQDot()
             speeds = {name: float(rates.get(places[name])) for name in coordinates}
+        if excitation is not None and frame % SAMPLED == 0:
+            samples.append(_sample(opensim, model, state, frame, coordinates, places))
     passive = energy if excitation is None else []
-    return MotionNumbers(times.tolist(), rows, excitation, activation, fiber, speeds, passive)
+    return MotionNumbers(times.tolist(), rows, excitation, activation, fiber, speeds, passive, samples)
+
+
+def _sample(
+    opensim: Any, model: Any, state: Any, frame: int, coordinates: dict[str, Any], places: dict[str, int]
+) -> MotionSample:
+    """Return what OpenSim says of the muscles at a state."""
+    model.realizeAcceleration(state)
+    every = model.getMuscles()
+    muscles = {every.get(i).getName(): every.get(i) for i in range(every.getSize())}
+    rates, second = state.getQDot(), state.getQDotDot()
+    beside = []
+    for sign in (-1.0, 1.0):
+        near, q = opensim.State(state), opensim.Vector(state.getQ())
+        for i in range(q.size()):
+            q.set(i, q.get(i) + sign * SHORT * rates.get(i))
+        near.setQ(q)
+        model.realizePosition(near)
+        beside.append({name: float(muscle.getLength(near)) for name, muscle in muscles.items()})
+    return MotionSample(
+        frame=frame,
+        speeds={name: float(rates.get(places[name])) for name in coordinates},
+        accelerations={name: float(second.get(places[name])) for name in coordinates},
+        activation={name: float(muscle.getActivation(state)) for name, muscle in muscles.items()},
+        fiber_length={name: float(muscle.getFiberLength(state)) for name, muscle in muscles.items()},
+        lengths={name: float(muscle.getLength(state)) for name, muscle in muscles.items()},
+        lengthening={name: (beside[1][name] - beside[0][name]) / (2.0 * SHORT) for name in muscles},
+        velocities={name: float(muscle.getLengtheningSpeed(state)) for name, muscle in muscles.items()},
+        tensions={name: float(muscle.getTendonForce(state)) for name, muscle in muscles.items()},
+    )
 
 
 def coordinate_places(state: Any, coordinates: dict[str, Any]) -> list[int]:

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import OsimError
 from mjwrap.osim.verifying.opensim_motions import coordinate_places, opensim_motion
-from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of
+from mjwrap.osim.verifying.opensim_paths import contacts, length_slopes, path_of, segments
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference, sha256_of
+from mjwrap.osim.verifying.scholz import scholz_length
+from mjwrap.osim.verifying.stops import TouchingRoute
 
 Array = NDArray[np.float64]
 ACTIVATIONS = (0.05, 0.5, 1.0)
@@ -24,7 +26,10 @@ WIDEST = {
 }  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
 ASSEMBLED = 1e-10  # largest error of OpenSim's constraints at a pose [m or rad]
 HALVINGS = 8  # how often a pose is drawn nearer to the default one
-RANK, MOVES = 1e-10, 1e-9  # shares of the largest singular value, and of a coordinate's own motion, that count
+RANK, MOVES = (
+    1e-10,
+    1e-9,
+)  # shares of the largest singular value, and of a coordinate's own motion, that count
 SAME = 1e-12  # difference of speeds from the coordinates' rates that is rounding
 PASSIVE, DRIVEN = 0.3, 0.5  # durations of motions [s]
 EXCITATION = 0.2
@@ -37,6 +42,23 @@ def has_opensim() -> bool:
     except (ImportError, OSError):
         return False
     return True
+
+
+def opensim_geodesic() -> Callable[[TouchingRoute], float | None] | None:
+    """Return a function that returns the length of OpenSim's geodesic over a route's stops [m], or None where OpenSim
+    has none; None without the opensim package."""
+    if not has_opensim():
+        return None
+    opensim: Any = importlib.import_module("opensim")
+    opensim.Logger.setLevelString("off")
+
+    def length(route: TouchingRoute) -> float | None:
+        try:
+            return scholz_length(opensim, route)
+        except RuntimeError:
+            return None
+
+    return length
 
 
 def compute_reference(
@@ -181,8 +203,11 @@ class _Computer:
             for name, force in self.paths.items()
             if (found := contacts(self.opensim, path_of(force), state))
         }
+        between = {name: segments(self.opensim, path_of(self.paths[name]), state) for name in wraps}
         slopes = length_slopes(model, state, self._curved, self._movable) if with_arms else {}
-        return PoseNumbers(values, bodies, mass, lengths, arms, tensions, wraps, slopes, speeds)
+        return PoseNumbers(
+            values, bodies, mass, lengths, arms, tensions, wraps, slopes, segments=between, speeds=speeds
+        )
 
     def _tensions(self, muscle: Any) -> list[float | None]:
         """Return the tension of a muscle at equilibrium, at rest, at each of the activations."""

@@ -48,6 +48,25 @@ def contacts(opensim: Any, path: Any, state: Any) -> dict[str, list[float]]:
     return found
 
 
+def segments(opensim: Any, path: Any, state: Any) -> dict[str, list[str]]:
+    """Return the names of the path points before and after each contact of a path, by wrap object."""
+    if not hasattr(path, "getCurrentPath"):
+        return {}
+    points = path.getCurrentPath(state)
+    wraps = []
+    for i in range(points.getSize()):
+        wrapped = opensim.PathWrapPoint.safeDownCast(points.get(i))
+        shape = None if wrapped is None else wrapped.getWrapObject()
+        wraps.append(None if shape is None else shape.getName())
+    places = [i for i, wrap in enumerate(wraps) if wrap is None]
+    found: dict[str, list[str]] = {}
+    for i, wrap in enumerate(wraps):
+        if wrap is not None:
+            around = max(p for p in places if p < i), min(p for p in places if p > i)
+            found[wrap] = [points.get(p).getName() for p in around]
+    return found
+
+
 def _array(vector: Any) -> Array:
     return np.array([vector.get(k) for k in range(3)])
 

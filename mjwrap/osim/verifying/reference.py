@@ -9,6 +9,7 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from mjwrap.errors import OsimError
 
 Array = NDArray[np.float64]
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,28 @@ class PoseNumbers:
     slopes: dict[
         str, dict[str, list[float]]
     ]  # by path over surfaces and coordinate: slopes of the length on either side
+    segments: dict[
+        str, dict[str, list[str]]
+    ]  # by path and wrap object: the path points before and after its contact
     speeds: list[list[float]] | None = (
         None  # OpenSim's speeds u from the rates of all coordinates, in their order, where they are not the same
     )
+
+
+@dataclass(frozen=True)
+class MotionSample:
+    """OpenSim's state in a driven motion, and what it says of the muscles there; `lengthening` is its rate of `lengths`
+    by differences, `velocities` the rate that it states."""
+
+    frame: int
+    speeds: dict[str, float]  # of all coordinates [rad/s, m/s]
+    accelerations: dict[str, float]  # of all coordinates [rad/s², m/s²]
+    activation: dict[str, float]
+    fiber_length: dict[str, float]  # [m]
+    lengths: dict[str, float]  # [m]
+    lengthening: dict[str, float]  # [m/s]
+    velocities: dict[str, float]  # [m/s]
+    tensions: dict[str, float]  # [N]
 
 
 @dataclass(frozen=True)
@@ -51,6 +71,7 @@ class MotionNumbers:
     fiber_length: dict[str, float] = field(default_factory=dict)  # at the start [m]
     speeds: dict[str, float] = field(default_factory=dict)  # at the start [rad/s, m/s]
     energy: list[float] = field(default_factory=list)  # kinetic and potential, of a passive motion [J]
+    samples: list[MotionSample] = field(default_factory=list)  # of a driven motion
 
 
 @dataclass(frozen=True)
@@ -92,7 +113,7 @@ def read_reference(path: str | Path) -> Reference:
         del given["format"]
         given["poses"] = [PoseNumbers(**pose) for pose in given["poses"]]
         for motion in ("passive", "driven"):
-            given[motion] = None if given[motion] is None else MotionNumbers(**given[motion])
+            given[motion] = None if given[motion] is None else _motion(given[motion])
         found = Reference(**given)
         fault = _fault(found)
     except (AttributeError, KeyError, TypeError, ValueError):
@@ -102,6 +123,11 @@ def read_reference(path: str | Path) -> Reference:
     if fault:
         raise OsimError(f"'{path}' is not a file of OpenSim's numbers: {fault}")
     return found
+
+
+def _motion(given: dict[str, Any]) -> MotionNumbers:
+    samples = [MotionSample(**sample) for sample in given.pop("samples")]
+    return MotionNumbers(**given, samples=samples)
 
 
 def _fault(found: Reference) -> str:
@@ -132,6 +158,12 @@ def _fault(found: Reference) -> str:
         for name, values in ({} if motion is None else motion.coordinates).items():
             if motion is not None and not _fits(values, (len(motion.time),)):
                 return f"coordinate '{name}' of a motion has a wrong size or is not a number"
+        for sample in [] if motion is None else motion.samples:
+            if not 0 <= sample.frame < len(motion.time if motion else ()):
+                return f"sample {sample.frame} of a motion has no frame"
+            for numbers in asdict(sample).values():
+                if isinstance(numbers, dict) and not _fits(list(numbers.values()), (len(numbers),)):
+                    return f"sample {sample.frame} of a motion has entries that are not numbers"
     return ""
 
 
