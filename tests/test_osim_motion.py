@@ -8,6 +8,8 @@ import pytest
 from osim_mechanics import mechanics, pose, reduction, switch
 from osim_models import FROZEN
 
+import mjwrap as mw
+
 MOTIONS = json.loads((FROZEN / "passive_motion.json").read_text())["models"]
 
 
