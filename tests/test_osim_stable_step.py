@@ -1,4 +1,4 @@
-"""The time step of an imported model: RK4's limit for tendons as springs and fibres as dampers, known in closed form."""
+"""The time step of an imported model: RK4's limit for tendons as springs and fibres as dampers, in closed form."""
 
 from typing import Any
 
@@ -82,14 +82,18 @@ def test_steps_of_imported_models(name: str, step: float) -> None:
 def test_the_limit_is_where_a_run_becomes_unstable(tmp_path) -> None:
     """The patella of this model hangs on an elastic tendon alone; the report says below 0.36 ms."""
     mw.import_osim(model_file("test_wrapAllVis")).save(tmp_path / "model.xml")
-    resets = {}
+    speeds = {}
     for timestep in (2e-4, 3.3e-4, 5e-4, 1e-3):
         model = mw.load(tmp_path / "model.xml")
         model.opt.timestep = timestep
-        data = mujoco.MjData(model)
+        data, random = mujoco.MjData(model), np.random.default_rng(0)
         mujoco.mj_resetDataKeyframe(model, data, 0)
-        data.ctrl[:] = 0.9
-        mujoco.mj_step(model, data, round(0.2 / timestep))
-        resets[timestep] = int(data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number)
-        assert np.isfinite(data.qpos).all()
-    assert [count > 0 for count in resets.values()] == [False, False, True, True]
+        highest = 0.0
+        for k in range(round(0.3 / timestep)):
+            if k % round(0.05 / timestep) == 0:
+                data.ctrl[:] = random.uniform(0.0, 1.0)
+            mujoco.mj_step(model, data)
+            highest = max(highest, float(np.abs(data.qvel).max()))
+        speeds[timestep] = highest
+    # of the elastic tendon's energy a free patella could reach a few hundred m/s and rad/s
+    assert [speed > 1e4 for speed in speeds.values()] == [False, False, True, True], speeds
