@@ -1,4 +1,4 @@
-"""Where a search has found no path with an end deep inside a surface, none is made near by, and nothing else changes."""
+"""Where a search found no path with an end deep inside a surface, none is made near by; nothing else changes."""
 
 import mujoco
 import numpy as np
@@ -14,7 +14,7 @@ SIZE = RADII[2] ** 2 / RADII[1]  # smallest radius of curvature of the ellipsoid
 
 
 def scenes(count: int) -> list[tuple[np.ndarray, np.ndarray, list[mw.Obstacle], mw.PathSolution]]:
-    """Return scenes with the insertion deep inside an ellipsoid, which a ball follows, and cold solves without a path."""
+    """Return scenes with the insertion deep inside an ellipsoid before a ball, and cold solves without a path."""
     rng, found = np.random.default_rng(3), []
     while len(found) < count:
         end = np.array(RADII) * rng.normal(size=3) * 0.35

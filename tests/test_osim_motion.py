@@ -5,8 +5,10 @@ import json
 import mujoco
 import numpy as np
 import pytest
-from osim_mechanics import mechanics, pose, reduction, restore_inertias, switch
+from osim_mechanics import mechanics, pose, reduction, switch
 from osim_models import FROZEN
+
+import mjwrap as mw
 
 MOTIONS = json.loads((FROZEN / "passive_motion.json").read_text())["models"]
 
@@ -17,7 +19,7 @@ class Run:
     def __init__(self, name: str, timestep: float) -> None:
         self.found = mechanics(name)
         self.model = model = self.found.compile()
-        restore_inertias(self.found, model)
+        mw.osim.restore_inertias(model)
         model.opt.timestep = timestep
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_SPRING
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_DAMPER

@@ -213,14 +213,15 @@ class MuscleSystem(Evaluator):
         if not (isinstance(nstep, int | np.integer) and nstep >= 0):
             raise StateError(f"nstep must be a whole number, not negative, got {validation.described(nstep)}")
         state = self._state(data)
-        before = resets(data)
+        before, reached = resets(data), data.time
         runge_kutta = int(self.model.opt.integrator) == _RK4
         try:
             if runge_kutta:
-                self._step_stages(state, data, nstep)
+                reached = self._step_stages(state, data, nstep)
             else:
                 for _ in range(nstep):
                     self._check(data)
+                    reached = max(reached, data.time)
                     self._pieces.set(data)
                     mujoco.mj_step1(self.model, data)
                     self._act(state, data, ahead=self.model.opt.timestep)
@@ -234,7 +235,7 @@ class MuscleSystem(Evaluator):
             self._take_back(state, data)
         if resets(data) > before:
             raise StateError(
-                f"the motion became unstable at about time {state.time:g} s and MuJoCo reset the data; "
+                f"the motion became unstable at about time {reached:g} s and MuJoCo reset the data; "
                 f"a smaller time step or more joint damping may help"
             )
 
@@ -252,9 +253,13 @@ class MuscleSystem(Evaluator):
         if state.joint_forces is not None:
             state.joint_forces.remove(data)
 
-    def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> None:
-        """Step under Runge-Kutta: add the wrenches in MuJoCo's control callback, which runs at every stage."""
+    def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> float:
+        """Step under Runge-Kutta: add the wrenches in MuJoCo's control callback, which runs at every stage.
+
+        Returns the latest time at which a step began; MuJoCo sets the time back where it resets the data.
+        """
         start, half = data.time, 0.5 * self.model.opt.timestep
+        reached = start
         before, acted = resets(data), False
         failed = np.zeros(self._plan.n, dtype=np.bool_)
         caught: list[Exception] = []
@@ -280,6 +285,7 @@ class MuscleSystem(Evaluator):
                 self._check(data)
                 self._pieces.set(data)
                 start = data.time
+                reached = max(reached, start)
                 failed[:] = False
                 acted = False
                 mujoco.mj_step(self.model, data)
@@ -289,6 +295,7 @@ class MuscleSystem(Evaluator):
                 state.count_held()
                 if self._plan.integrates and acted and resets(data) == before:
                     self._store(state, data)
+        return reached
 
     def reset(self, data: mujoco.MjData | None = None) -> None:
         """Forget branches, warm starts and last forces. Call it after `mj_resetData` or a jump of qpos.
