@@ -87,7 +87,7 @@ def _degroote(law: WrittenLaw, given: Mapping[str, float]) -> None:
     law.name = "degroote_fregly_2016"
     _take(
         law,
-        {"fiber_damping": "fiber_damping"},
+        {"fiber_damping": "fiber_damping", "activation_smoothing": "activation_dynamics_smoothing"},
         given,
     )
     law.words["activation_dynamics"] = "degroote_fregly_2016"
