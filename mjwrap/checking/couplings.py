@@ -13,7 +13,7 @@ from mjwrap.errors import StateError
 from mjwrap.mjcf import name_of
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.poses.sizes import turning_dofs
-from mjwrap.system.checks import resets
+from mjwrap.system.checks import ResetWatch
 from mjwrap.system.pieces import PieceSwitch
 
 Array = NDArray[np.float64]
@@ -60,6 +60,7 @@ def _motion(model: mujoco.MjModel, couplings: CoupledJoints, pieces: PieceSwitch
     turning = turning_dofs(model)
     speed = np.where(turning, *SPEED) * rng.uniform(-1.0, 1.0, model.nv)
     data.qvel[:] = couplings.matrix(data.qpos) @ speed[couplings.independent]
+    watch = ResetWatch(data)
     worst = {False: (0.0, ""), True: (0.0, "")}
     try:
         for _ in range(max(1, round(SECONDS / model.opt.timestep))):
@@ -69,7 +70,7 @@ def _motion(model: mujoco.MjModel, couplings: CoupledJoints, pieces: PieceSwitch
                 worst[turns] = max(worst[turns], (abs(error), name_of(model, _JOINT, joint)))
     except StateError as error:
         return f"not seen in a motion: {error}"
-    if resets(data):
+    if watch.reset:
         return "not seen in a motion, which became unstable"
     told = [f"{size:.1e} {'rad' if turns else 'm'} ({name})" for turns, (size, name) in worst.items() if name]
     return (

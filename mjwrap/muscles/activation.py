@@ -23,7 +23,7 @@ class ActivationDynamics:
             latter.
         deactivation_time: time constant of deactivation [s], positive; None for 0.040 with the former and 0.060 with
             the latter.
-        smoothing: b of the latter, positive; a larger value is less smooth.
+        smoothing: b of the latter, positive; a larger value is less smooth. The paper has 10, OpenSim's muscle 0.1.
 
     Raises:
         ModelError: a value is not possible.

@@ -1,4 +1,4 @@
-"""Parameters of the four curves of Millard 2012: their names and order in OpenSim, its defaults, what is possible."""
+"""Parameters of the four curves of Millard 2012: those not given, and what is possible."""
 
 from __future__ import annotations
 
@@ -7,43 +7,19 @@ from collections.abc import Sequence
 
 from mjwrap import validation
 from mjwrap.errors import ModelError
+from mjwrap.kernels.musculotendon import millard_numbers
 
 Numbers = tuple[float, ...]
 ACTIVE, VELOCITY = "active_force_length_curve", "force_velocity_curve"
 PASSIVE, TENDON = "fiber_force_length_curve", "tendon_force_length_curve"
-# The parameters of each curve, in OpenSim's order, with its defaults; None: by a rule from the others.
-PARAMETERS: dict[str, dict[str, float | None]] = {
-    ACTIVE: {
-        "min_norm_active_fiber_length": 0.4441,
-        "transition_norm_fiber_length": 0.73,
-        "max_norm_active_fiber_length": 1.8123,
-        "shallow_ascending_slope": 0.8616,
-        "minimum_value": 0.1,
-    },
-    VELOCITY: {
-        "concentric_slope_at_vmax": 0.0,
-        "concentric_slope_near_vmax": 0.25,
-        "isometric_slope": 5.0,
-        "eccentric_slope_at_vmax": 0.0,
-        "eccentric_slope_near_vmax": 0.15,
-        "max_eccentric_velocity_force_multiplier": 1.4,
-        "concentric_curviness": 0.6,
-        "eccentric_curviness": 0.9,
-    },
-    PASSIVE: {
-        "strain_at_zero_force": 0.0,
-        "strain_at_one_norm_force": 0.7,
-        "stiffness_at_low_force": None,
-        "stiffness_at_one_norm_force": None,
-        "curviness": None,
-    },
-    TENDON: {
-        "strain_at_one_norm_force": 0.049,
-        "stiffness_at_one_norm_force": None,
-        "norm_force_at_toe_end": None,
-        "curviness": None,
-    },
+# OpenSim's class of each curve, and its parameters in OpenSim's order, with its defaults; None: by a rule.
+CLASSES = {
+    ACTIVE: "ActiveForceLengthCurve",
+    VELOCITY: "ForceVelocityCurve",
+    PASSIVE: "FiberForceLengthCurve",
+    TENDON: "TendonForceLengthCurve",
 }
+PARAMETERS = {key: millard_numbers.PARAMETERS[kind] for key, kind in CLASSES.items()}
 # How many of its parameters a curve may be given: all, or without those that follow by a rule.
 COUNTS: dict[str, tuple[int, ...]] = {
     key: tuple(dict.fromkeys((sum(value is not None for value in names.values()), len(names))))
@@ -70,10 +46,10 @@ def completed(key: str, given: Sequence[float] | None, law: str) -> Numbers:
         ]
     if key == PASSIVE and len(values) == 2:
         _above(law, key, "strain_at_one_norm_force", values[1], values[0])
-        values += [0.2, 2.0 / (values[1] - values[0]), 0.75]
+        values += millard_numbers.fiber_by_rule(values[0], values[1])
     if key == TENDON and len(values) == 1:
         _above(law, key, "strain_at_one_norm_force", values[0], 0.0)
-        values += [1.375 / values[0], 2.0 / 3.0, 0.5]
+        values += millard_numbers.tendon_by_rule(values[0])
     _CHECKS[key](law, *values)
     return tuple(values)
 

@@ -6,13 +6,13 @@ from typing import Protocol
 
 import mujoco
 
-from mjwrap.errors import ModelError, PathError, StateError
+from mjwrap.errors import ModelError, PathError
 from mjwrap.mjcf import has_plugin, read_declarations, read_model
 from mjwrap.paths import Status
 from mjwrap.runs.models import load, load_spec
 from mjwrap.runs.state_tables import put_own
 from mjwrap.system import CableSystem, MuscleSystem, is_cable
-from mjwrap.system.checks import resets
+from mjwrap.system.checks import ResetWatch
 from mjwrap.text import counted
 
 MODES = PYTHON, WRENCH, TRANSMISSION = "python", "wrench", "transmission"
@@ -93,13 +93,11 @@ class PluginEngine:
         """Advance by one time step."""
         for i in self._own:
             self._excitations[self.muscles.names[i]][0] = self.muscles.excitation[i]
-        before = resets(self.data)
+        watch = ResetWatch(self.data)
         mujoco.mj_step(self.model, self.data)
-        if resets(self.data) > before:
-            raise StateError(
-                "the motion became unstable and MuJoCo reset the data; "
-                "a smaller time step or more joint damping may help"
-            )
+        watch.end()
+        if watch.reset:
+            raise watch.error()
         if self._strict:
             for name, why in self.failures().items():
                 raise PathError(f"muscle '{name}' at time {self.data.time:g} s: {why}")

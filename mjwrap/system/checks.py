@@ -18,10 +18,43 @@ _BADQVEL = int(mujoco.mjtWarning.mjWARN_BADQVEL)
 _BADQACC = int(mujoco.mjtWarning.mjWARN_BADQACC)
 
 
-def resets(data: mujoco.MjData) -> int:
-    """Return how often MuJoCo has reset the data because the state was not finite or too large."""
-    number = data.warning.number
-    return int(number[_BADQPOS]) + int(number[_BADQVEL]) + int(number[_BADQACC])
+class ResetWatch:
+    """Find out whether MuJoCo resets data because the state is not finite or too large.
+
+    A reset sets MuJoCo's counts of warnings to zero, so that a second one leaves the same counts as the first. So they
+    are counted from zero here; `end` adds the earlier ones. time: of the last step that began [s].
+    """
+
+    def __init__(self, data: mujoco.MjData) -> None:
+        self._data, self.time = data, float(data.time)
+        self._warnings = [data.warning[k] for k in (_BADQPOS, _BADQVEL, _BADQACC)]
+        self._earlier = [warning.number for warning in self._warnings]
+        self._found: bool | None = None  # at the end
+        for warning in self._warnings:
+            warning.number = 0
+
+    def begin(self) -> None:
+        """Note that a step begins."""
+        self.time = float(self._data.time)
+
+    @property
+    def reset(self) -> bool:
+        """Whether MuJoCo has reset the data."""
+        return any(warning.number for warning in self._warnings) if self._found is None else self._found
+
+    def end(self) -> None:
+        """Restore the earlier counts, unless a reset has cleared them."""
+        self._found = self.reset
+        if not self._found:
+            for warning, number in zip(self._warnings, self._earlier, strict=True):
+                warning.number = number
+
+    def error(self) -> StateError:
+        """Return the error for a reset."""
+        return StateError(
+            f"the motion became unstable at about time {self.time:g} s and MuJoCo reset the data; "
+            "a smaller time step or more joint damping may help"
+        )
 
 
 def ends_inside(model: mujoco.MjModel, poses: mujoco.MjData, muscle: MuscleDeclaration) -> str:

@@ -23,7 +23,7 @@ from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.energetics import Energetics, Umberger2010, compute_energetics, metabolic_constants
 from mjwrap.muscles.fibers import FiberState, fiber_state
 from mjwrap.system.callback import control_callback
-from mjwrap.system.checks import resets
+from mjwrap.system.checks import ResetWatch
 from mjwrap.system.derivatives import length_jacobian_rate
 from mjwrap.system.evaluator import Evaluator
 from mjwrap.system.moment_arms import CoordinateMotions
@@ -100,9 +100,14 @@ class MuscleSystem(Evaluator):
 
         For loops of `apply`, `mj_step` and `advance`; `step` does all three. These states are the activation and fibre
         length in `data.act` of actuators with dyntype="user" actdim="2", and those of muscles without an actuator.
-        Raises `StateError` unless `apply` and `mj_step` came before.
+        Raises `StateError` unless `apply` and `mj_step` came before, or if MuJoCo reset the data in that step.
         """
         state = self._state(data)
+        if state.applied is not None and data.time < state.applied:
+            raise StateError(
+                f"no step to advance: the time went back from {state.applied:g} s to {data.time:g} s: the data were reset, as MuJoCo does "
+                "when a motion becomes unstable; call reset, then apply, then mj_step, then advance"
+            )
         if state.applied is None or not data.time > state.applied:
             raise StateError("no step to advance: call apply, then mj_step, then advance")
         self._store(state, data)
@@ -213,31 +218,31 @@ class MuscleSystem(Evaluator):
         if not (isinstance(nstep, int | np.integer) and nstep >= 0):
             raise StateError(f"nstep must be a whole number, not negative, got {validation.described(nstep)}")
         state = self._state(data)
-        before, reached = resets(data), data.time
+        watch = ResetWatch(data)
         runge_kutta = int(self.model.opt.integrator) == _RK4
         try:
             if runge_kutta:
-                reached = self._step_stages(state, data, nstep)
+                self._step_stages(state, data, nstep, watch)
             else:
                 for _ in range(nstep):
                     self._check(data)
-                    reached = max(reached, data.time)
                     self._pieces.set(data)
+                    watch.begin()
                     mujoco.mj_step1(self.model, data)
                     self._act(state, data, ahead=self.model.opt.timestep)
                     state.failures += state.status != 0
                     state.count_held()
                     mujoco.mj_step2(self.model, data)
                     self._take_back(state, data)
-                    if self._plan.integrates and resets(data) == before:
+                    if watch.reset:
+                        break
+                    if self._plan.integrates:
                         self._store(state, data)
         finally:
             self._take_back(state, data)
-        if resets(data) > before:
-            raise StateError(
-                f"the motion became unstable at about time {reached:g} s and MuJoCo reset the data; "
-                f"a smaller time step or more joint damping may help"
-            )
+            watch.end()
+        if watch.reset:
+            raise watch.error()
 
     def _act(self, state: State, data: mujoco.MjData, since: float = 0.0, ahead: float = 0.0) -> None:
         """Evaluate at the present stage of `data`, whose kinematics are up to date, and add the forces."""
@@ -253,14 +258,10 @@ class MuscleSystem(Evaluator):
         if state.joint_forces is not None:
             state.joint_forces.remove(data)
 
-    def _step_stages(self, state: State, data: mujoco.MjData, nstep: int) -> float:
-        """Step under Runge-Kutta: add the wrenches in MuJoCo's control callback, which runs at every stage.
-
-        Returns the latest time at which a step began; MuJoCo sets the time back where it resets the data.
-        """
+    def _step_stages(self, state: State, data: mujoco.MjData, nstep: int, watch: ResetWatch) -> None:
+        """Step under Runge-Kutta: add the wrenches in MuJoCo's control callback, which runs at every stage."""
         start, half = data.time, 0.5 * self.model.opt.timestep
-        reached = start
-        before, acted = resets(data), False
+        acted = False
         failed = np.zeros(self._plan.n, dtype=np.bool_)
         caught: list[Exception] = []
 
@@ -284,8 +285,8 @@ class MuscleSystem(Evaluator):
             for _ in range(nstep):
                 self._check(data)
                 self._pieces.set(data)
+                watch.begin()
                 start = data.time
-                reached = max(reached, start)
                 failed[:] = False
                 acted = False
                 mujoco.mj_step(self.model, data)
@@ -293,9 +294,10 @@ class MuscleSystem(Evaluator):
                     raise caught[0]
                 state.failures += failed
                 state.count_held()
-                if self._plan.integrates and acted and resets(data) == before:
+                if watch.reset:
+                    break
+                if self._plan.integrates and acted:
                     self._store(state, data)
-        return reached
 
     def reset(self, data: mujoco.MjData | None = None) -> None:
         """Forget branches, warm starts and last forces. Call it after `mj_resetData` or a jump of qpos.

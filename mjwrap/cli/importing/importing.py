@@ -17,6 +17,7 @@ from mjwrap.cli.importing.page import write_page
 from mjwrap.cli.importing.text import tell_entries, tell_verification
 from mjwrap.errors import OsimError
 from mjwrap.mjcf import read_model
+from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.mjcf.named_models import osim_file
 from mjwrap.osim.importing import Imported
 from mjwrap.osim.verifying.differences import Verification, verify
@@ -63,7 +64,8 @@ def import_model(settings: ImportSettings) -> int:
     known = _numbers(settings) if settings.verify else None  # a mistake here is reported early
     imported = import_osim(settings.model, meshes=settings.geometry, limits=settings.limits)
     imported.save(out)
-    report.say(f"{out}: {_contents(imported)}")
+    model = imported.spec.compile()
+    report.say(f"{out}: {_contents(model)}")
     report.say(tell_entries(imported.report))
     clamped = sum(entry.kind == CLAMPED for entry in imported.report.entries)
     if clamped and not settings.limits:
@@ -78,13 +80,18 @@ def import_model(settings: ImportSettings) -> int:
         report.say(f"page:      {page.path}")
     report.finish(_values(out, imported, found))
     if found is None:
-        report.say(f"next:      mjwrap inspect {out}; mjwrap run {out} --duration 1")
+        inspect = f"mjwrap inspect {out}; " if _has_parts(model) else ""
+        report.say(f"next:      {inspect}mjwrap run {out} --duration 1")
     return FAULTS if found is not None and found.unexplained else 0
 
 
-def _contents(imported: Imported) -> str:
+def _has_parts(model: mujoco.MjModel) -> bool:
+    """Return whether a model has paths or couplings, which `mjwrap inspect` lists."""
+    return bool((model.wrap_type == int(mujoco.mjtWrap.mjWRAP_SITE)).any() or read_couplings(model))
+
+
+def _contents(model: mujoco.MjModel) -> str:
     """Return in words what the written model has."""
-    model = imported.spec.compile()
     return (
         f"{model.nbody - 1} bodies, {model.njnt} joints, {model.nu} actuators, {model.ntendon} tendons, "
         f"{model.neq} equalities"

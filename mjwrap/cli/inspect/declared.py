@@ -45,7 +45,7 @@ def piece_text(model: mujoco.MjModel, routes: Sequence[Route]) -> str:
     Where no pose has all points, the alternatives are listed, each with the poses at which it holds.
     """
     whole = [route for route in routes if all(presence.holds for presence in route.when)]
-    conditions = {site: _condition(routes, site) for route in routes for site in route.sites}
+    conditions = {site: condition(routes, site) for route in routes for site in route.sites}
     if not whole or len(routes) == 1:
         return " / ".join(path_text(model, route) for route in routes)
     text = path_text(model, replace(whole[0], when=()), whole=True)
@@ -57,7 +57,7 @@ def piece_text(model: mujoco.MjModel, routes: Sequence[Route]) -> str:
     return f"{text}, {', '.join(told)}"
 
 
-def _condition(routes: Sequence[Route], site: int) -> tuple[JointRange, ...]:
+def condition(routes: Sequence[Route], site: int) -> tuple[JointRange, ...]:
     """Return the ranges in which a site belongs to the path, none for one that always does."""
     for point, presence in enumerate(routes[0].when):
         if all((site in route.sites) == route.when[point].holds for route in routes):

@@ -19,6 +19,7 @@ from mjwrap.cli.common.output import Report
 from mjwrap.cli.inspect.cables import cable_rows, cable_table
 from mjwrap.cli.inspect.declared import as_values, table
 from mjwrap.cli.inspect.moment_arms import arms_table, moment_arms
+from mjwrap.cli.inspect.parts import parts_of, parts_text
 from mjwrap.poses.angles import check_range
 from mjwrap.runs.models import load, single_joints, start_keyframe, start_state
 from mjwrap.system import CableSystem, MuscleSystem, is_cable
@@ -58,8 +59,16 @@ def inspect(settings: InspectSettings) -> int:
             check_range(model, single[name], low, high, f"{name}={low:g}deg,{high:g}deg")
     report = Report(settings.json)
     muscles = CableSystem(model, side_rule=settings.side_rule)
+    parts = parts_of(model, muscles.declarations)
     if not muscles.names and not muscles.native:
-        raise UserError("the model has no muscles and no actuators on spatial tendons: nothing to inspect")
+        if not any(parts.values()):
+            raise UserError(
+                "the model has no muscles and no actuators on spatial tendons: nothing to inspect"
+            )
+        report.say(f"{settings.model}: no muscles and no actuators on spatial tendons")
+        report.say(parts_text(parts))
+        report.finish({"model": settings.model, **parts})
+        return 0
     report.say(
         f"{settings.model}: {counted_paths(muscles.n, len(muscles.cables))} with geodesic paths, "
         f"{len(muscles.native)} with MuJoCo's own paths"
@@ -73,6 +82,8 @@ def inspect(settings: InspectSettings) -> int:
         report.say(cable_table(cables))
     for name, reason in muscles.native.items():
         report.say(f"{name}: stays with MuJoCo: {reason}")
+    if any(parts.values()):
+        report.say(parts_text(parts))
     arms = moment_arms(muscles, rest)
     report.say(arms_table(model, arms))
     mistakes = possible_mistakes(muscles, rest=rest, sweep=not settings.quick)
@@ -85,6 +96,7 @@ def inspect(settings: InspectSettings) -> int:
         "muscles": [as_values(model, muscle) for muscle in own],
         "cables": cables,
         "native": muscles.native,
+        **parts,
         "unmet_hints": _unmet_hints(muscles, rest),
         "moment_arms": arms,
         "possible_mistakes": [asdict(mistake) for mistake in mistakes],

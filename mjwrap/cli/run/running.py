@@ -21,6 +21,7 @@ from mjwrap.cli.run.mistakes import warn
 from mjwrap.cli.run.run_files import OutputSettings, open_outputs
 from mjwrap.errors import ModelError
 from mjwrap.files.atomic import uninterrupted
+from mjwrap.mjcf.couplings import read_couplings
 from mjwrap.recording import Server, serve
 from mjwrap.runs.engine import MODES
 from mjwrap.runs.simulation import RunSettings, Simulation, WallTime
@@ -132,7 +133,9 @@ def tell(
     for remark in simulation.prescribed.remarks:
         report.say(remark)
     if not muscles.n and not muscles.native:
-        report.say("the model declares no muscle for mjwrap; MuJoCo alone simulated it")
+        switched = any(len(each.equalities) > 1 for each in read_couplings(muscles.model))
+        done = "mjwrap only switched the pieces of its couplings" if switched else "MuJoCo alone simulated it"
+        report.say(f"the model declares no muscle for mjwrap; {done}")
     if muscles.native:
         report.say(f"{counted(len(muscles.native), 'actuator')} left to MuJoCo:")
         for name, reason in muscles.native.items():

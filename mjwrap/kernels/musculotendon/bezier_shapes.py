@@ -1,6 +1,7 @@
 """Corners of the four curves of Millard et al. 2013 (doi 10.1115/1.4023390) from the parameters that OpenSim has.
 
-The parameters of each function are those of OpenSim's curve of that name, in its order, with its defaults.
+The parameters of each function are those of OpenSim's curve of that name, in its order; `millard_numbers.py` has their
+defaults.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from mjwrap.kernels.musculotendon import bezier
 
 
 def active(
-    shortest: float = 0.4441,
-    transition: float = 0.73,
-    longest: float = 1.8123,
-    shallow: float = 0.8616,
-    least: float = 0.0,
+    shortest: float,
+    transition: float,
+    longest: float,
+    shallow: float,
+    least: float,
 ) -> bezier.Array:
     """Return the corners of ActiveForceLengthCurve: one at optimal fibre length, `least` at both ends and beyond.
 
@@ -38,14 +39,14 @@ def active(
 
 
 def velocity(
-    at_least: float = 0.0,
-    near_least: float = 0.25,
-    isometric: float = 5.0,
-    at_most: float = 0.0,
-    near_most: float = 0.15,
-    most: float = 1.4,
-    concentric_curviness: float = 0.6,
-    eccentric_curviness: float = 0.9,
+    at_least: float,
+    near_least: float,
+    isometric: float,
+    at_most: float,
+    near_most: float,
+    most: float,
+    concentric_curviness: float,
+    eccentric_curviness: float,
 ) -> bezier.Array:
     """Return the corners of ForceVelocityCurve, from -1 to 1 [v_max l_o]: zero at -1, one at rest, `most` at 1.
 
@@ -64,17 +65,16 @@ def velocity(
 
 
 def passive(
-    zero: float = 0.0,
-    strain: float = 0.7,
-    low: float = 0.2,
-    high: float | None = None,
-    curviness: float = 0.75,
+    zero: float,
+    strain: float,
+    low: float,
+    high: float,
+    curviness: float,
 ) -> bezier.Array:
     """Return the corners of FiberForceLengthCurve: zero up to the strain `zero`, one at `strain`.
 
-    low, high: stiffness after the first corner, and at `strain`; None for 2 / (strain - zero).
+    low, high: stiffness after the first corner, and at `strain`.
     """
-    high = 2.0 / (strain - zero) if high is None else high
     toe = min(0.1 / high, 0.1 * (strain - zero))
     start = 1.0 + zero
     y = low * 0.5 * toe
@@ -82,14 +82,11 @@ def passive(
     return bezier.corners(ends, [curviness, curviness])
 
 
-def tendon(
-    strain: float = 0.049, stiffness: float | None = None, toe: float = 2.0 / 3.0, curviness: float = 0.5
-) -> bezier.Array:
+def tendon(strain: float, stiffness: float, toe: float, curviness: float) -> bezier.Array:
     """Return the corners of TendonForceLengthCurve: zero without strain, one at `strain`, straight above force `toe`.
 
-    stiffness: of the straight part; None for 1.375 / strain.
+    stiffness: of the straight part.
     """
-    stiffness = 1.375 / strain if stiffness is None else stiffness
     x_toe = 1.0 + strain + (toe - 1.0) / stiffness
     x_middle = 1.0 + strain + (0.5 * toe - 1.0) / stiffness
     x_start = 1.0 + (x_toe - 1.0) / 10.0

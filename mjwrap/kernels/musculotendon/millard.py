@@ -12,22 +12,23 @@ import numpy as np
 
 from mjwrap.kernels.compilation.jit import jit
 from mjwrap.kernels.musculotendon import bezier, bezier_shapes
+from mjwrap.kernels.musculotendon.millard_numbers import defaults
 
 CODE = 3
-LEAST = 0.4441  # shortest fibre with active force [l_o]
+LEAST = defaults("ActiveForceLengthCurve")[0]  # shortest fibre with active force [l_o]
 MAX_VELOCITY = 100.0  # [v_max l_o] bound of the fibre velocity, where no force limits it
 MAX_STEPS = 80  # most Newton steps and bisections for a velocity; three or four are normal
 
 
-_ACTIVE = bezier_shapes.active()
+_ACTIVE = bezier_shapes.active(*defaults("ActiveForceLengthCurve")[:4], 0.0)  # damped: no minimum force
 _ACTIVE_PIECES, _ACTIVE_CELLS = bezier.tabulate(_ACTIVE)
-_VELOCITY = bezier_shapes.velocity()
+_VELOCITY = bezier_shapes.velocity(*defaults("ForceVelocityCurve"))
 _VELOCITY_PIECES, _VELOCITY_CELLS = bezier.tabulate(_VELOCITY)
 _SPEEDS, _FORCES = bezier.sampled(_VELOCITY, 1001)
 _VELOCITIES = np.interp(np.linspace(0.0, 1.4, 65), _FORCES, _SPEEDS)  # start of iterations, by force
-_PASSIVE = bezier_shapes.passive()
+_PASSIVE = bezier_shapes.passive(*defaults("FiberForceLengthCurve"))
 _PASSIVE_PIECES, _PASSIVE_CELLS = bezier.tabulate(_PASSIVE)
-_TENDON = bezier_shapes.tendon()
+_TENDON = bezier_shapes.tendon(*defaults("TendonForceLengthCurve"))
 _TENDON_PIECES, _TENDON_CELLS = bezier.tabulate(_TENDON)
 
 

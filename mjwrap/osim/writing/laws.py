@@ -9,16 +9,9 @@ from mjwrap.errors import ModelError
 from mjwrap.mjcf.parameters import law_arguments
 from mjwrap.muscles.activation import ActivationDynamics
 from mjwrap.muscles.laws import LAWS
-from mjwrap.muscles.millard_curves import PARAMETERS
+from mjwrap.muscles.millard_curves import CLASSES, PARAMETERS
 from mjwrap.osim.description.forces import Muscle
 
-# Curves of Millard2012 in the file, by numeric; their parameters and order are those of `millard_curves.PARAMETERS`.
-MILLARD_CURVES = {
-    "active_force_length_curve": "ActiveForceLengthCurve",
-    "force_velocity_curve": "ForceVelocityCurve",
-    "fiber_force_length_curve": "FiberForceLengthCurve",
-    "tendon_force_length_curve": "TendonForceLengthCurve",
-}
 HILL = {  # numeric -> the file's parameter, of every class with fibre and tendon
     "max_isometric_force": "max_isometric_force",
     "optimal_fiber_length": "optimal_fiber_length",
@@ -98,7 +91,7 @@ def _take(law: WrittenLaw, names: Mapping[str, str], given: Mapping[str, float])
 def _millard(law: WrittenLaw, muscle: Muscle) -> None:
     names = {MINIMUM: MINIMUM, MOST_PENNATION: "maximum_pennation_angle", "fiber_damping": "fiber_damping"}
     _take(law, names, muscle.parameters)
-    for numeric, kind in MILLARD_CURVES.items():
+    for numeric, kind in CLASSES.items():
         curve = muscle.curves.get(kind, {})
         if all(name in curve for name in PARAMETERS[numeric]):
             law.numbers[numeric] = [float(curve[name]) for name in PARAMETERS[numeric]]
@@ -108,7 +101,11 @@ def _millard(law: WrittenLaw, muscle: Muscle) -> None:
 
 def _degroote(law: WrittenLaw, given: Mapping[str, float]) -> None:
     law.name = "degroote_fregly_2016"
-    _take(law, {"fiber_damping": "fiber_damping"}, given)
+    _take(
+        law,
+        {"fiber_damping": "fiber_damping", "activation_smoothing": "activation_dynamics_smoothing"},
+        given,
+    )
     law.words["activation_dynamics"] = "degroote_fregly_2016"
     usual = {"active_force_width_scale": 1.0, "tendon_strain_at_one_norm_force": 0.049,
              "passive_fiber_strain_at_one_norm_force": 0.6, "ignore_passive_fiber_force": 0.0}  # fmt: skip
