@@ -9,7 +9,9 @@ import sys
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from numba import typeof
 from numba.core import types
 from numba.core.registry import cpu_target
 
@@ -19,8 +21,11 @@ from mjwrap.kernels.compilation.cache_folders import config
 if config.DISABLE_JIT or self_test.is_plain():
     pytest.skip("kernels are not compiled, or by numba.njit alone", allow_module_level=True)
 
+import mjwrap as mw
 from mjwrap.cli.common import meanwhile
 from mjwrap.kernels.compilation import linking, pipeline, progress
+from mjwrap.muscles import bench
+from mjwrap.paths import sweep
 
 
 def double(x):
@@ -190,3 +195,37 @@ def test_all_deferred_kernels_that_may_be_called_can_be_compiled_in_advance() ->
     assert kernel(-1.0) == 0.0
     assert (deferred.compile_called(), deferred.compile_called()) == (1, 0)
     assert kernel(1.0) == 2.0
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_sweep_over_any_number_of_obstacles_needs_what_warmup_compiles(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kernel is compiled anew for each layout of its arrays, so that they all have the same one."""
+    seen: list[list[Any]] = []
+    monkeypatch.setattr(
+        sweep.chain,
+        "solve_motion",
+        lambda *given: seen.append([typeof(a) for a in given if hasattr(a, "shape")]),
+    )
+    row = [mw.Obstacle(mw.Sphere(0.01)) for _ in range(number)]
+    places, turns = np.zeros((4, number, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (4, number, 1))
+    mw.solve_sweep((0.1, 0.0, 0.0), (-0.1, 0.0, 0.0), row, places, turns)
+    mw.solve_sweep(np.zeros((4, 3)) + 0.1, (-0.1, 0.0, 0.0), row, places[:, ::-1], turns[:, ::-1])
+    assert all(array.layout == "C" for given in seen for array in given)
+    assert len(seen) == 2
+    assert seen[0] == seen[1]
+
+
+def test_a_single_muscle_needs_what_warmup_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[list[Any]] = []
+    monkeypatch.setattr(bench.kernels, "simulate", lambda *given: seen.append([typeof(a) for a in given[1:]]))
+    law, time = mw.DeGrooteFregly2016(500.0, 0.1, 0.2, tendon="elastic"), np.linspace(0.0, 0.1, 5)
+    meanwhile.laws()
+    mw.simulate_muscle(
+        law, time, np.linspace(0.3, 0.31, 5), excitation=np.linspace(0.1, 0.9, 5), velocity=np.zeros(5)
+    )
+    time.flags.writeable = False
+    mw.simulate_muscle(law, time, 0.3, excitation=0.5)
+    assert len(seen) == 3
+    assert seen[0] == seen[1] == seen[2]

@@ -298,7 +298,7 @@ def test_run_warns_where_the_page_says_so(tmp_path: Path, capsys: pytest.Capture
         model.write_text(edited(*case.edits))
         ran = run_here("run", capsys, model, "--duration", 0.01)
         warned = [line for line in said(ran) if line.startswith("mjwrap run: warning: ")]
-        assert any(all(word in line for word in case.words) for line in warned), (name, warned)
+        assert any(all(word in line for word in case.words) for line in warned), (name, ran.code, ran.err)
 
 
 @pytest.mark.parametrize("mode", ["wrench", "transmission"])

@@ -118,7 +118,7 @@ def _column(name: str, values: ArrayLike, size: int) -> Array:
         raise StateError(f"{name} must be one number or have shape ({size},) like time, not {given.shape}")
     if not np.isfinite(given).all():
         raise StateError(f"{name} is not finite")
-    return np.ascontiguousarray(np.broadcast_to(given, (size,)))
+    return np.array(np.broadcast_to(given, (size,)), order="C")
 
 
 def _rates(values: Array, time: Array) -> Array:

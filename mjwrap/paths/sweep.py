@@ -49,7 +49,7 @@ class SweepSolution:
 
 def _motion(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
     try:
-        array = np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape))
+        array = np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), shape), order="C")
     except (TypeError, ValueError):
         raise GeometryError(f"{what} must have shape {shape}, not {np.shape(value)}") from None
     if not np.isfinite(array).all():
@@ -101,8 +101,10 @@ def solve_sweep(
     chain.solve_motion(
         _motion(origin, (poses, 3), "origin"),
         _motion(insertion, (poses, 3), "insertion"),
-        where[:, owner],
-        turned[:, owner],
+        where.take(
+            owner, axis=1
+        ),  # contiguous for any number of obstacles, so that the kernel is compiled once
+        turned.take(owner, axis=1),
         node,
         bool(warm),
         float(tol),

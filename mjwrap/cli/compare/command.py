@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--muscles",
         nargs="+",
         metavar="NAME",
-        help="compare only these muscles (* and ? match any characters)",
+        help="compare only these muscles and cables (* and ? match any characters)",
     )
     add_tendons(parser, "compare")
     add(
@@ -92,7 +92,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "as by mjwrap plot",
     )
     add("--plot", metavar="FILE.png", help="plot the comparison (.png, .pdf, .svg)")
-    add("--report", metavar="FILE.html", help="write a page with a table of all muscles, plots and verdicts")
+    add(
+        "--report",
+        metavar="FILE.html",
+        help="write a page with a table of all muscles and cables, plots and verdicts",
+    )
     add("--csv", metavar="FILE.csv", help="write a row for every muscle and pose, without sweeps that "
         "change nothing; with tables of another program also FILE_tables.csv")  # fmt: skip
     add(

@@ -1,4 +1,4 @@
-"""List the muscles of a model, with laws and wrapping surfaces, and report implausible parameters.
+"""List the muscles and cables of a model, with laws and wrapping surfaces, and report implausible parameters.
 
 MODEL is an MJCF or MJB file, mjwrap:NAME (a model that comes with mjwrap), or myo_sim:NAME (myo-sim package).
 
