@@ -13,7 +13,6 @@ from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import dof_names
 from mjwrap.mjcf.couplings import CoupledJoints
-from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.muscles.energetics import Energetics, Umberger2010, basal_power
 from mjwrap.muscles.fibers import FiberState
 from mjwrap.system import MuscleSystem
@@ -98,7 +97,7 @@ class MuscleAnalysisTables:
         for quantity, read in FIBERS.items() if fibers else ():
             with_fibers = [names[i] for i in fibers]
             self._add(f"{prefix}_MuscleAnalysis", quantity, with_fibers, _only(read, fibers))
-        self._dofs = self._moving(model)
+        self._dofs = self._moving()
         for dof in self._dofs:
             name = dofs[dof].replace("/", "_")
             self._add(f"{prefix}_MuscleAnalysis", f"MomentArm_{name}", names, lambda s, d=dof: s.arms[:, d])
@@ -115,18 +114,10 @@ class MuscleAnalysisTables:
 
             self._add(f"{prefix}_ProbeReporter", "probes", heads, metabolic)
 
-    def _moving(self, model: mujoco.MjModel) -> list[int]:
+    def _moving(self) -> list[int]:
         """Return the degrees of freedom that move a muscle, alone or with those that equalities tie to them."""
-        crossed = np.atleast_1d(crossed_dofs(model, self._muscles.declarations).any(axis=0))
-        moving = crossed.copy()
-        couplings = self._motions.couplings
-        for joint in couplings.leader:
-            for head in couplings.heads(joint):
-                moving[model.jnt_dofadr[head]] |= crossed[model.jnt_dofadr[joint]]
-        rest = mujoco.MjData(model)
-        for dof in np.flatnonzero(~moving):
-            moving[dof] = (self._motions.along(rest, int(dof))[crossed] != 0.0).any()
-        return np.flatnonzero(moving).tolist()
+        moved = self._motions.moved_muscles(self._muscles.declarations)
+        return np.flatnonzero(moved.any(axis=0)).tolist()
 
     def _add(self, prefix: str, quantity: str, names: list[str], read: Read) -> None:
         output = self._open(f"{prefix}_{quantity}.sto")
@@ -136,10 +127,8 @@ class MuscleAnalysisTables:
 
     def log(self, data: mujoco.MjData) -> None:
         """Write the results at the present state."""
-        muscles, arms = self._muscles, np.zeros((self._muscles.n, data.qvel.size))
-        jacobian = muscles.length_jacobian(data)
-        for dof in self._dofs:
-            arms[:, dof] = -jacobian @ self._motions.along(data, dof)
+        muscles = self._muscles
+        arms = self._motions.arms(data, muscles.length_jacobian(data), self._dofs)
         energy = muscles.energetics(Umberger2010())
         sample = _Sample(arms, muscles.fiber_state(), energy, muscles.length, muscles.tension)
         for part in self._parts:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from mjwrap import validation
 from mjwrap.errors import GeometryError
-from mjwrap.mjcf import name_of, names
+from mjwrap.mjcf import MuscleDeclaration, name_of, names
 from mjwrap.mjcf.coupling_pieces import equation
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.mjcf.names import listed
+from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.system.equalities import Equalities
 from mjwrap.system.least_motion import CoordinateRates, least_motion
 from mjwrap.text import nearest
@@ -72,6 +73,26 @@ class CoordinateMotions:
             return self._about(data, _Target("", dof, False))
         except GeometryError:
             return np.zeros(self.model.nv)
+
+    def arms(self, data: mujoco.MjData, jacobian: Array, dofs: Iterable[int]) -> Array:
+        """Return moment arms (n, nv) [m] about degrees of freedom from J = ∂l/∂q (n, nv), 0 about all others."""
+        arms = np.zeros_like(jacobian)
+        for dof in dofs:
+            arms[:, dof] = -jacobian @ self.along(data, dof)
+        return arms
+
+    def moved_muscles(self, muscles: Sequence[MuscleDeclaration]) -> NDArray[np.bool_]:
+        """Return which degrees of freedom move each muscle (n, nv), alone or with those that equalities tie to them."""
+        model = self.model
+        crossed = crossed_dofs(model, muscles)
+        moved = crossed.copy()
+        for joint in self.couplings.leader:
+            for head in self.couplings.heads(joint):
+                moved[:, model.jnt_dofadr[head]] |= crossed[:, model.jnt_dofadr[joint]]
+        rest = mujoco.MjData(model)
+        for dof in np.flatnonzero(~moved.any(axis=0)):
+            moved[:, dof] = (crossed & (self.along(rest, int(dof)) != 0.0)).any(axis=1)
+        return moved
 
     def _targets(self, name: str) -> list[_Target]:
         """Return what a name stands for; `GeometryError` if there is no such joint or coordinate."""
@@ -142,6 +163,25 @@ def _least(rows: Array, wanted: Array, rates: Array) -> Array | None:
     found = least_motion(every, right, rates)
     possible = float(np.abs(every @ found - right).max()) <= POSSIBLE / size
     return found if possible else None
+
+
+def arms_of_all_dofs(couplings: CoupledJoints, jacobian: Array, qpos: Array) -> Array:
+    """Return moment arms (n, nv) [m]: −J N for independent degrees of freedom, −J for those that follow others."""
+    arms = -jacobian
+    arms[:, couplings.independent] = arms @ couplings.matrix(qpos)
+    return arms
+
+
+def moved_muscles(
+    model: mujoco.MjModel, couplings: CoupledJoints, muscles: Sequence[MuscleDeclaration]
+) -> NDArray[np.bool_]:
+    """Return which degrees of freedom move each muscle (n, nv), alone or with the joints that follow them."""
+    crossed = crossed_dofs(model, muscles)
+    moved = crossed.copy()
+    for joint in couplings.leader:
+        for head in couplings.heads(joint):
+            moved[:, model.jnt_dofadr[head]] |= crossed[:, model.jnt_dofadr[joint]]
+    return moved
 
 
 def _listed(coordinates: Iterable[str]) -> list[str]:
