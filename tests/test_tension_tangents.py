@@ -38,7 +38,7 @@ def states(seed, count=40):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_elastic_tendon_balances_a_fibre_that_takes_all_the_speed(name):
-    """With the fibre length that the tension implies, found by bisection of the tendon alone, the fibre pulls as much."""
+    """At the fibre length that the tension implies, found by bisection of the tendon alone, the fibre pulls as much."""
     law, params = rows(LAWS[name])
     pulling = 0
     for a, length, speed in states(1):

@@ -2,11 +2,11 @@
 
     python benchmarks/inverse/freeze_static_optimization.py FOLDER
 
-It needs the package `opensim`. Into FOLDER it writes `parity_arm.osim`, an arm with two hinges and six Millard muscles on
-straight lines and via points, some of them pennate, with a reserve of 1 N m at each hinge; `parity_arm.mot`, 201 frames
-over 1 s; and what OpenSim's StaticOptimization finds, as `parity_arm_activation.sto` and `parity_arm_force.sto`. Also
-`pennate_muscles.osim`, one pennate muscle of each law on a slide, and `pennate_muscles.json`, the active forces along the
-tendon that the tool takes for them.
+It needs the package `opensim`. Into FOLDER it writes `parity_arm.osim`, an arm with two hinges and six Millard muscles
+on straight lines and via points, some of them pennate, with a reserve of 1 N m at each hinge; `parity_arm.mot`, 201
+frames over 1 s; and what OpenSim's StaticOptimization finds, as `parity_arm_activation.sto` and
+`parity_arm_force.sto`. Also `pennate_muscles.osim`, one pennate muscle of each law on a slide, and
+`pennate_muscles.json`, the active forces along the tendon that the tool takes for them.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ MUSCLES = [
     ("latissimus", 1000.0, 0.14, 0.05, 0.0, [(GROUND, -0.05, -0.08, 0.0), (UPPER, -0.01, -0.08, 0.0)]),
     ("biceps", 800.0, 0.13, 0.19, 0.0, [(GROUND, 0.03, 0.02, 0.0), (UPPER, 0.03, -0.2, 0.0), (FORE, 0.01, -0.05, 0.0)]),
     ("brachialis", 900.0, 0.09, 0.05, 0.15, [(UPPER, 0.02, -0.17, 0.0), (FORE, 0.01, -0.04, 0.0)]),
-    ("triceps_long", 800.0, 0.14, 0.15, 0.21, [(GROUND, -0.03, -0.03, 0.0), (UPPER, -0.03, -0.28, 0.0), (FORE, -0.02, 0.01, 0.0)]),
-    ("triceps_short", 1100.0, 0.09, 0.1, 0.16, [(UPPER, -0.03, -0.1, 0.0), (UPPER, -0.03, -0.27, 0.0), (FORE, -0.02, 0.01, 0.0)]),
+    ("triceps_long", 800.0, 0.14, 0.15, 0.21,
+     [(GROUND, -0.03, -0.03, 0.0), (UPPER, -0.03, -0.28, 0.0), (FORE, -0.02, 0.01, 0.0)]),
+    ("triceps_short", 1100.0, 0.09, 0.1, 0.16,
+     [(UPPER, -0.03, -0.1, 0.0), (UPPER, -0.03, -0.27, 0.0), (FORE, -0.02, 0.01, 0.0)]),
 ]  # fmt: skip
 
 
