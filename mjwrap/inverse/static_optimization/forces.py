@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,8 @@ class Forces:
 
     def subset(self, frames: Flags) -> Forces:
         """Return the forces of some frames (T,)."""
-        parts = (x[frames] for x in (self.length, self.speed, self.rest, self.strength))
-        return Forces(self.law, self.params, *parts, self.curved, self.least)
+        per_frame = ("length", "speed", "rest", "strength")
+        return replace(self, **{name: getattr(self, name)[frames] for name in per_frame})
 
 
 def muscle_forces(

@@ -97,7 +97,10 @@ def solve(programs: Programs, jobs: int = 1) -> Optima:
         missing, arms = wanted[part], programs.moment_arms[part]
         subtract_forces(pattern, arms, programs.force[part], missing)
         given = Frames(arms, programs.strength[part], missing, programs.low[part], programs.high[part])
-        found = Results(*(array[part] for array in results))
+        found = Results(
+            results.activation[part], results.reserve[part], results.dual[part],
+            results.status[part], results.iterations[part],
+        )  # fmt: skip
         solve_frames(pattern, given, objective, found, _work(len(pattern.row), muscles, rows))
         optimality_residuals(pattern, given, objective, found, residual[part], np.zeros(rows), np.zeros(rows))
         prove_infeasible(pattern, given, objective, found, infeasible[part])
