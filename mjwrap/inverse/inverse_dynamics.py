@@ -21,7 +21,7 @@ from mjwrap.errors import ModelError, StateError
 from mjwrap.files import Table
 from mjwrap.inverse.coordinates import IndependentCoordinates
 from mjwrap.inverse.external_loads import ExternalLoads, LoadFrames
-from mjwrap.inverse.motion import Motion
+from mjwrap.inverse.motion import CompleteMotion, Motion
 from mjwrap.mjcf import has_plugin
 
 Array = NDArray[np.float64]
@@ -75,20 +75,18 @@ def generalized_forces(model: mujoco.MjModel, motion: Motion, loads: ExternalLoa
         raise ModelError(
             "the engine plugin drives the muscles of this model; take mjwrap.plugin.without_plugin(model)"
         )
-    motion = motion.completed(model)
+    whole = motion.completed(model)
     independent = IndependentCoordinates(model)
-    whole = joint_forces(model, motion, loads)
-    found = np.zeros((len(motion), len(independent.dofs)))
-    for first in range(0, len(motion), BLOCK):
+    forces = joint_forces(model, whole, loads)
+    found = np.zeros((len(whole), len(independent.dofs)))
+    for first in range(0, len(whole), BLOCK):
         block = slice(first, first + BLOCK)
-        found[block] = np.einsum("tvk,tv->tk", independent.matrices(motion.qpos[block]), whole[block])
+        found[block] = np.einsum("tvk,tv->tk", independent.matrices(whole.qpos[block]), forces[block])
     return found
 
 
-def joint_forces(model: mujoco.MjModel, motion: Motion, loads: ExternalLoads | None = None) -> Array:
-    """Return the forces (T, nv) about all degrees of freedom that a completed motion needs without any constraint."""
-    assert motion.qvel is not None
-    assert motion.qacc is not None
+def joint_forces(model: mujoco.MjModel, motion: CompleteMotion, loads: ExternalLoads | None = None) -> Array:
+    """Return the forces (T, nv) about all degrees of freedom that a motion needs without any constraint."""
     frames = LoadFrames(model, loads or ExternalLoads(()), motion.time)
     evaluate = _whole if _has_more(model) else _rigid_bodies
     bare = copy.copy(model)

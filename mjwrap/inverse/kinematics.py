@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.inverse.motion import Motion
+from mjwrap.inverse.motion import CompleteMotion
 
 Array = NDArray[np.float64]
 BLOCK = 256  # frames, few enough to stay in the processor's cache
@@ -33,9 +33,8 @@ class Kinematics:
         """Return an array of the present block, frames first."""
         return self._held[name][: self.count]
 
-    def blocks(self, motion: Motion) -> Iterator[tuple[int, int]]:
-        """Fill block after block; yield the first frame of each, and one behind its last. motion: completed."""
-        assert motion.qvel is not None
+    def blocks(self, motion: CompleteMotion) -> Iterator[tuple[int, int]]:
+        """Fill block after block; yield the first frame of each, and one behind its last."""
         model, data = self._model, self._data
         qpos, qvel = data.qpos, data.qvel
         kept = list(zip(self._held.values(), self._sources, strict=True))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mjwrap import validation
 from mjwrap.errors import StateError
@@ -20,7 +20,7 @@ from mjwrap.inverse.splines import ENDS, angular_rates, continuous, derivatives
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Motion:
     """The motion of a model: what `muscle_analysis`, `inverse_dynamics` and other inverse tools follow.
 
@@ -40,33 +40,35 @@ class Motion:
 
     time: Array
     qpos: Array
-    qvel: Array | None = None
-    qacc: Array | None = None
-    ends: str = "not-a-knot"
+    qvel: Array | None
+    qacc: Array | None
+    ends: str
 
-    def __post_init__(self) -> None:
-        validation.choice(self.ends, ENDS, "ends", StateError)
-        time = validation.numbers(self.time, "time", StateError)
-        if time.ndim != 1 or not len(time):
-            raise StateError(f"time must be (T,) with at least one time, not of shape {time.shape}")
-        if not np.isfinite(time).all() or (np.diff(time) <= 0.0).any():
+    def __init__(
+        self,
+        time: ArrayLike,
+        qpos: ArrayLike,
+        qvel: ArrayLike | None = None,
+        qacc: ArrayLike | None = None,
+        ends: str = "not-a-knot",
+    ) -> None:
+        validation.choice(ends, ENDS, "ends", StateError)
+        times = validation.numbers(time, "time", StateError)
+        if times.ndim != 1 or not len(times):
+            raise StateError(f"time must be (T,) with at least one time, not of shape {times.shape}")
+        if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
             raise StateError("time must be finite and ascend")
-        object.__setattr__(self, "time", time)
-        for name in ("qpos", "qvel", "qacc"):
-            given = getattr(self, name)
-            if given is None and name != "qpos":
-                continue
-            values = validation.numbers(given, name, StateError)
-            if values.ndim != 2 or len(values) != len(time):
-                raise StateError(
-                    f"{name} must have a row for each of {len(time)} times, not shape {values.shape}"
-                )
-            bad = np.argwhere(~np.isfinite(values))
-            if len(bad):
-                raise StateError(f"{name}[{bad[0][1]}] is not finite at time {time[bad[0][0]]:g} s")
-            object.__setattr__(self, name, values)
-        if self.qpos.shape[1] < max(_width(self.qvel), _width(self.qacc)):
+        poses = _rows("qpos", qpos, times)
+        rates = [
+            None if given is None else _rows(name, given, times)
+            for name, given in (("qvel", qvel), ("qacc", qacc))
+        ]
+        if poses.shape[1] < max(0 if rate is None else rate.shape[1] for rate in rates):
             raise StateError("qvel and qacc have more columns than qpos")
+        for name, value in zip(
+            ("time", "qpos", "qvel", "qacc", "ends"), (times, poses, *rates, ends), strict=True
+        ):
+            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -138,7 +140,7 @@ class Motion:
         IndependentCoordinates(model).couplings.place(placed)
         return replace(self, qpos=np.ascontiguousarray(placed.T), **mapped)
 
-    def completed(self, model: mujoco.MjModel) -> Motion:
+    def completed(self, model: mujoco.MjModel) -> CompleteMotion:
         """Return the motion with all velocities and accelerations, and quaternions of length 1.
 
         Splines of degree 5 through the positions give both; if velocities are given, accelerations are the slopes of
@@ -149,17 +151,18 @@ class Motion:
             StateError: the motion does not fit the model, or a quaternion is zero.
         """
         whole = self._checked(model)
-        if self.qvel is not None and self.qacc is not None:
-            return whole
-        if self.qvel is not None:
-            return replace(whole, qacc=derivatives(self.time, self.qvel, self.ends)[0])
-        qvel, second = _rates(model, self.time, whole.qpos, self.ends)
-        couplings = IndependentCoordinates(model).couplings
-        poses, speeds, growth = (np.ascontiguousarray(a.T) for a in (whole.qpos, qvel, second))
-        couplings.spread(poses, speeds)
-        couplings.accelerate(poses, speeds, growth)
-        qacc = np.ascontiguousarray(growth.T) if self.qacc is None else self.qacc
-        return replace(whole, qvel=np.ascontiguousarray(speeds.T), qacc=qacc)
+        qvel, qacc = self.qvel, self.qacc
+        if qvel is None:
+            speeds, growth = _rates(model, self.time, whole.qpos, self.ends)
+            couplings = IndependentCoordinates(model).couplings
+            columns = tuple(np.ascontiguousarray(a.T) for a in (whole.qpos, speeds, growth))
+            couplings.spread(*columns[:2])
+            couplings.accelerate(*columns)
+            qvel, found = (np.ascontiguousarray(a.T) for a in columns[1:])
+            qacc = found if qacc is None else qacc
+        elif qacc is None:
+            qacc = derivatives(self.time, qvel, self.ends)[0]
+        return CompleteMotion(self.time, whole.qpos, qvel, qacc, self.ends)
 
     def _checked(self, model: mujoco.MjModel) -> Motion:
         """Return the motion with quaternions of length 1; `StateError` if it does not fit the model."""
@@ -179,8 +182,23 @@ class Motion:
         return replace(self, qpos=qpos)
 
 
-def _width(values: Array | None) -> int:
-    return 0 if values is None else values.shape[1]
+@dataclass(frozen=True, eq=False, init=False)
+class CompleteMotion(Motion):
+    """A motion with all velocities and accelerations, (T, nv)."""
+
+    qvel: Array
+    qacc: Array
+
+
+def _rows(name: str, given: ArrayLike, time: Array) -> Array:
+    """Return numbers with a row for each time; `StateError` for others."""
+    values = validation.numbers(given, name, StateError)
+    if values.ndim != 2 or len(values) != len(time):
+        raise StateError(f"{name} must have a row for each of {len(time)} times, not shape {values.shape}")
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        raise StateError(f"{name}[{bad[0][1]}] is not finite at time {time[bad[0][0]]:g} s")
+    return values
 
 
 def _rates(model: mujoco.MjModel, time: Array, qpos: Array, ends: str) -> tuple[Array, Array]:

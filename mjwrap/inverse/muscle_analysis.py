@@ -42,7 +42,8 @@ class MuscleAnalysis:
         velocity: (T, n) lengthening speeds [m/s].
         moment_arm: (T, n, k) −(J N) [m], about a translation [-]: times a tension, the generalised force about the
             coordinate, with that of all joints that follow it.
-        active_force: (T, n) along the tendon at the given activation [N], not negative.
+        active_force: (T, n) along the tendon at the given activation [N]; negative where a fibre shortens faster than
+            a law's force-velocity curve is positive.
         passive_force: (T, n) along the tendon without activation [N]: elastic and damping; negative where a damped
             fibre would push. Tension is the sum of both, but never below zero.
         status: (T, n) codes of `mw.Status`. A muscle without a path keeps the values of its last valid one; before the
@@ -101,14 +102,14 @@ def muscle_analysis(
     validation.instance(motion, Motion, "motion", StateError, "a mw.Motion")
     jobs = validation.whole(jobs, 1, "jobs", StateError)
     model, plan = muscles.model, muscles._plan
-    motion = motion.completed(model)
+    whole = motion.completed(model)
     independent = IndependentCoordinates(model)
-    frames, n, k = len(motion), plan.n, len(independent.dofs)
+    frames, n, k = len(whole), plan.n, len(independent.dofs)
     drive = _activations(activation, frames, n)
     followers = np.setdiff1d(np.arange(model.nv), independent.dofs)
     last = Evaluation(n, plan.node.copy(), len(plan.routes))
     found = MuscleAnalysis(
-        motion.time, tuple(muscles.names), independent.names,
+        whole.time, tuple(muscles.names), independent.names,
         np.zeros((frames, n)), np.zeros((frames, n)), np.zeros((frames, n, k)),
         np.zeros((frames, n)), np.zeros((frames, n)), np.zeros((frames, n), dtype=np.int64),
     )  # fmt: skip
@@ -120,22 +121,22 @@ def muscle_analysis(
     )
     shares = _shares(plan.routes, jobs)
     with ThreadPoolExecutor(len(shares)) if len(shares) > 1 else _Here() as pool:
-        for first, end in kinematics.blocks(motion):
+        for first, end in kinematics.blocks(whole):
             block, some = slice(first, end), kinematics.array
             slopes = np.zeros((end - first, len(last.slopes), path_points.SLOPE))
             active = np.ones((end - first, len(plan.routes)), dtype=np.int64)
             if points is not None:
                 slopes = np.zeros((end - first, len(points.axes), path_points.SLOPE))
                 place_points(
-                    *points[:5], points.force, motion.qpos[block], some("xpos"), some("xmat"), model.site_pos,
+                    *points[:5], points.force, whole.qpos[block], some("xpos"), some("xmat"), model.site_pos,
                     some("site_xpos"), slopes, active,
                 )  # fmt: skip
             shared = (
                 *plan.route_group(), plan.law, plan.params,
                 *(some(name) for name in ("site_xpos", "geom_xpos", "geom_xmat", "cvel", "subtree_com")),
-                muscles._root, muscles._last_dof, muscles._dofs[2], some("cdof"), _given(motion.qvel)[block],
+                muscles._root, muscles._last_dof, muscles._dofs[2], some("cdof"), whole.qvel[block],
                 plan.uses, slopes, active, TOLERANCE, *last.paths,
-                drive[block], independent.dofs, followers, independent.matrices(motion.qpos[block]),
+                drive[block], independent.dofs, followers, independent.matrices(whole.qpos[block]),
             )  # fmt: skip
             results = (
                 last.length, last.velocity, last.status,
@@ -151,7 +152,7 @@ def muscle_analysis(
     if muscles.strict and found.status.any():
         t, m = np.argwhere(found.status)[0]
         why = Status(int(found.status[t, m])).name.lower()
-        raise PathError(f"muscle '{found.names[m]}' at time {motion.time[t]:g} s: no path ({why})")
+        raise PathError(f"muscle '{found.names[m]}' at time {whole.time[t]:g} s: no path ({why})")
     return found
 
 
@@ -165,11 +166,6 @@ class _Here:
 
     def __exit__(self, *_: object) -> None:
         pass
-
-
-def _given(values: Array | None) -> Array:
-    assert values is not None
-    return values
 
 
 def _activations(given: ArrayLike, frames: int, n: int) -> Array:
