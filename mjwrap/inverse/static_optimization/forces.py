@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
 from mjwrap.inverse.muscle_analysis import MuscleAnalysis
-from mjwrap.inverse.static_optimization.programs import CHUNK, in_threads
+from mjwrap.inverse.static_optimization.programs import CHUNK
+from mjwrap.inverse.threads import in_threads
 from mjwrap.kernels.musculotendon.dispatch import DEGROOTE_FREGLY, MILLARD, PASSIVE, THELEN, has_fiber
 from mjwrap.kernels.musculotendon.fiber import ELASTIC, HEIGHT, MIN_ACTIVATION, OPTIMAL, SLACK
 from mjwrap.kernels.musculotendon.tangent import tangents

@@ -108,7 +108,7 @@ def static_optimization(
     high = np.maximum(low, high)
     given = Programs(
         analysis.moment_arm, forces.rest, forces.strength,
-        generalized_forces(muscles.model, motion, loads), cost, limits, low, high,
+        generalized_forces(muscles.model, motion, loads, threads), cost, limits, low, high,
     )  # fmt: skip
     found, used, unsettled = _solve_all(given, forces, threads)
     return _result(analysis, given, used, found, unsettled)

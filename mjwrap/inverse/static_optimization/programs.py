@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from mjwrap.inverse.threads import in_threads
 from mjwrap.kernels.optimization.dual_newton import solve_frames
 from mjwrap.kernels.optimization.feasibility import prove_infeasible
 from mjwrap.kernels.optimization.optimality import optimality_residuals
@@ -111,17 +110,6 @@ def solve(programs: Programs, jobs: int = 1) -> Optima:
     reserve = np.empty_like(results.reserve)
     reserve[:, order] = results.reserve
     return Optima(results.activation, reserve, status, residual, results.iterations, infeasible)
-
-
-def in_threads(run: Callable[[int], None], begins: Iterable[int], jobs: int) -> None:
-    """Call a function for every chunk, `jobs` of them at a time."""
-    if jobs == 1:
-        for begin in begins:
-            run(begin)
-        return
-    with ThreadPoolExecutor(jobs) as pool:
-        for _ in pool.map(run, begins):
-            pass
 
 
 def used_entries(moment_arms: Array) -> NDArray[np.bool_]:
