@@ -1,6 +1,7 @@
 """The optimisation of activations: optimality, other solvers, hard problems, special problems solved by hand."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ HARD = [
 ]
 
 
-def one(arms, strength, wanted, *, weights=None, reserve=1.0, low=None, high=None):
+def one(arms, strength, wanted, *, weights=None, reserve: Any = 1.0, low=None, high=None):
     """Return the programs of a single frame."""
     arms = np.asarray(arms, dtype=float)[None]
     n, k = arms.shape[1:]

@@ -1,5 +1,7 @@
 """Tension as an affine function of activation near one: balance of elastic tendons, slopes, limits."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from mjwrap.kernels.musculotendon import fiber
 from mjwrap.kernels.musculotendon.tangent import tangent, tangents
 from mjwrap.kernels.musculotendon.tension import force_parts, tension
 
-HILL = {"max_isometric_force": 900.0, "optimal_fiber_length": 0.05, "tendon_slack_length": 0.2}
+HILL: Any = {"max_isometric_force": 900.0, "optimal_fiber_length": 0.05, "tendon_slack_length": 0.2}
 LAWS = {
     "millard": mw.Millard2012(**HILL, pennation_angle=0.4, tendon="elastic"),
     "straight millard": mw.Millard2012(**HILL, tendon="elastic", fiber_damping=0.02),
@@ -38,7 +40,7 @@ def states(seed, count=40):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_elastic_tendon_balances_a_fibre_that_takes_all_the_speed(name):
-    """With the fibre length that the tension implies, found by bisection of the tendon alone, the fibre pulls as much."""
+    """At the fibre length that the tension implies, found by bisection of the tendon alone, the fibre pulls as much."""
     law, params = rows(LAWS[name])
     pulling = 0
     for a, length, speed in states(1):

@@ -2,11 +2,11 @@
 
     python benchmarks/inverse/freeze_static_optimization.py FOLDER
 
-It needs the package `opensim`. Into FOLDER it writes `parity_arm.osim`, an arm with two hinges and six Millard muscles on
-straight lines and via points, some of them pennate, with a reserve of 1 N m at each hinge; `parity_arm.mot`, 201 frames
-over 1 s; and what OpenSim's StaticOptimization finds, as `parity_arm_activation.sto` and `parity_arm_force.sto`. Also
-`pennate_muscles.osim`, one pennate muscle of each law on a slide, and `pennate_muscles.json`, the active forces along the
-tendon that the tool takes for them.
+It needs the package `opensim`. Into FOLDER it writes `parity_arm.osim`, an arm with two hinges and six Millard muscles
+on straight lines and via points, some of them pennate, with a reserve of 1 N m at each hinge; `parity_arm.mot`, 201
+frames over 1 s; and what OpenSim's StaticOptimization finds, as `parity_arm_activation.sto` and
+`parity_arm_force.sto`. Also `pennate_muscles.osim`, one pennate muscle of each law on a slide, and
+`pennate_muscles.json`, the active forces along the tendon that the tool takes for them.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ MUSCLES = [
     ("latissimus", 1000.0, 0.14, 0.05, 0.0, [(GROUND, -0.05, -0.08, 0.0), (UPPER, -0.01, -0.08, 0.0)]),
     ("biceps", 800.0, 0.13, 0.19, 0.0, [(GROUND, 0.03, 0.02, 0.0), (UPPER, 0.03, -0.2, 0.0), (FORE, 0.01, -0.05, 0.0)]),
     ("brachialis", 900.0, 0.09, 0.05, 0.15, [(UPPER, 0.02, -0.17, 0.0), (FORE, 0.01, -0.04, 0.0)]),
-    ("triceps_long", 800.0, 0.14, 0.15, 0.21, [(GROUND, -0.03, -0.03, 0.0), (UPPER, -0.03, -0.28, 0.0), (FORE, -0.02, 0.01, 0.0)]),
-    ("triceps_short", 1100.0, 0.09, 0.1, 0.16, [(UPPER, -0.03, -0.1, 0.0), (UPPER, -0.03, -0.27, 0.0), (FORE, -0.02, 0.01, 0.0)]),
+    ("triceps_long", 800.0, 0.14, 0.15, 0.21,
+     [(GROUND, -0.03, -0.03, 0.0), (UPPER, -0.03, -0.28, 0.0), (FORE, -0.02, 0.01, 0.0)]),
+    ("triceps_short", 1100.0, 0.09, 0.1, 0.16,
+     [(UPPER, -0.03, -0.1, 0.0), (UPPER, -0.03, -0.27, 0.0), (FORE, -0.02, 0.01, 0.0)]),
 ]  # fmt: skip
 
 
@@ -43,9 +45,9 @@ def main() -> None:
     motion.write_text(motion_table())
     freeze_pennate(folder)
     with tempfile.TemporaryDirectory() as made:
-        run(str(folder / "parity_arm.osim"), str(motion), made)
+        run(str(folder / "parity_arm.osim"), str(motion), made, 1.0, CONVERGENCE)
         for part in ("activation", "force"):
-            text = Path(made, f"arm_StaticOptimization_{part}.sto").read_text()
+            text = Path(made, f"run_StaticOptimization_{part}.sto").read_text()
             about = (
                 f"made by benchmarks/inverse/freeze_static_optimization.py, OpenSim {opensim.GetVersion()}\n"
             )
@@ -75,15 +77,21 @@ def arm() -> opensim.Model:
         for i, (body, *at) in enumerate(points):
             muscle.addNewPathPoint(f"{name}-P{i + 1}", bodies[body], opensim.Vec3(*at))
         model.addForce(muscle)
-    for coordinate in ("shoulder", "elbow"):
+    add_reserves(model, 1.0)
+    return model
+
+
+def add_reserves(model: opensim.Model, optimal: float) -> None:
+    """Add a reserve to every coordinate of a model, with its optimal force [N m], [N]."""
+    model.finalizeConnections()
+    for coordinate in [each.getName() for each in model.getCoordinateSet()]:
         reserve = opensim.CoordinateActuator(coordinate)
         reserve.setName(f"{coordinate}_reserve")
-        reserve.setOptimalForce(1.0)
-        reserve.setMinControl(-1000.0)
-        reserve.setMaxControl(1000.0)
+        reserve.setOptimalForce(optimal)
+        reserve.setMinControl(-1e5)
+        reserve.setMaxControl(1e5)
         model.addForce(reserve)
     model.finalizeConnections()
-    return model
 
 
 def freeze_pennate(folder: Path) -> None:
@@ -137,25 +145,24 @@ def motion_table() -> str:
     return "\n".join([*head, *rows, ""])
 
 
-def run(model: str, motion: str, folder: str) -> None:
-    """Run OpenSim's static optimisation of a motion."""
+def run(model: str, motion: str, folder: str, end: float, convergence: float) -> None:
+    """Run OpenSim's static optimisation of a motion from 0 to `end` [s]; it writes its tables to a folder."""
     tool = opensim.AnalyzeTool()
-    tool.setName("arm")
+    tool.setName("run")
     tool.setModelFilename(model)
     tool.setCoordinatesFileName(motion)
     tool.setLowpassCutoffFrequency(-1.0)
     tool.setInitialTime(0.0)
-    tool.setFinalTime(1.0)
+    tool.setFinalTime(end)
     tool.setResultsDir(folder)
     tool.setOutputPrecision(16)
     optimization = opensim.StaticOptimization()
     optimization.setStartTime(0.0)
-    optimization.setEndTime(1.0)
+    optimization.setEndTime(end)
     optimization.setActivationExponent(2.0)
-    optimization.setConvergenceCriterion(CONVERGENCE)
+    optimization.setConvergenceCriterion(convergence)
     optimization.setMaxIterations(2000)
     tool.updAnalysisSet().cloneAndAppend(optimization)
-    tool.updControllerSet()
     setup = Path(folder, "setup.xml")
     tool.printToXML(str(setup))
     opensim.AnalyzeTool(str(setup)).run()

@@ -22,10 +22,11 @@ from mjwrap.files import Table
 from mjwrap.inverse.coordinates import IndependentCoordinates
 from mjwrap.inverse.external_loads import ExternalLoads, LoadFrames
 from mjwrap.inverse.motion import CompleteMotion, Motion
+from mjwrap.inverse.threads import in_threads
 from mjwrap.mjcf import has_plugin
 
 Array = NDArray[np.float64]
-BLOCK = 256  # frames whose N are in memory at once
+BLOCK = 128  # frames that one thread evaluates in a row, and whose N are in memory at once
 _OFF = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT) | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 _DISCRETE = int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
 # what makes forces along tendons that MuJoCo's own inverse dynamics has, in some versions of MuJoCo
@@ -66,8 +67,10 @@ def inverse_dynamics(model: mujoco.MjModel, motion: Motion, loads: ExternalLoads
     return Table(motion.time, independent.labels, values, header)
 
 
-def generalized_forces(model: mujoco.MjModel, motion: Motion, loads: ExternalLoads | None = None) -> Array:
-    """Return the values (T, k) of `inverse_dynamics`; columns as of `IndependentCoordinates`."""
+def generalized_forces(
+    model: mujoco.MjModel, motion: Motion, loads: ExternalLoads | None = None, jobs: int = 1
+) -> Array:
+    """Return the values (T, k) of `inverse_dynamics`, in `jobs` threads; columns as of `IndependentCoordinates`."""
     validation.of_type(model, "MjModel", "model", ModelError)
     validation.instance(motion, Motion, "motion", StateError, "a mw.Motion")
     validation.optional(loads, ExternalLoads, "loads", StateError, "mw.ExternalLoads")
@@ -77,7 +80,7 @@ def generalized_forces(model: mujoco.MjModel, motion: Motion, loads: ExternalLoa
         )
     whole = motion.completed(model)
     independent = IndependentCoordinates(model)
-    forces = joint_forces(model, whole, loads)
+    forces = joint_forces(model, whole, loads, jobs)
     found = np.zeros((len(whole), len(independent.dofs)))
     for first in range(0, len(whole), BLOCK):
         block = slice(first, first + BLOCK)
@@ -85,24 +88,30 @@ def generalized_forces(model: mujoco.MjModel, motion: Motion, loads: ExternalLoa
     return found
 
 
-def joint_forces(model: mujoco.MjModel, motion: CompleteMotion, loads: ExternalLoads | None = None) -> Array:
+def joint_forces(
+    model: mujoco.MjModel, motion: CompleteMotion, loads: ExternalLoads | None = None, jobs: int = 1
+) -> Array:
     """Return the forces (T, nv) about all degrees of freedom that a motion needs without any constraint."""
     frames = LoadFrames(model, loads or ExternalLoads(()), motion.time)
-    evaluate = _whole if _has_more(model) else _rigid_bodies
-    bare = copy.copy(model)
-    bare.opt.disableflags |= _OFF
-    bare.opt.enableflags &= ~_DISCRETE
-    data = mujoco.MjData(bare)
-    qpos, qvel, qacc = data.qpos, data.qvel, data.qacc
+    evaluate, bare = _rigid_bodies, model
+    if _has_more(model):
+        evaluate, bare = _whole, copy.copy(model)
+        bare.opt.disableflags |= _OFF
+        bare.opt.enableflags &= ~_DISCRETE
     found = np.zeros((len(motion), model.nv))
-    external = np.zeros(model.nv)
-    for k in range(len(motion)):
-        qpos[:], qvel[:], qacc[:] = motion.qpos[k], motion.qvel[k], motion.qacc[k]
-        evaluate(bare, data, found[k])
-        if len(loads or ()):
-            external[:] = 0.0
-            frames.add(data, k, external)
-            found[k] -= external
+
+    def run(begin: int) -> None:
+        data, external = mujoco.MjData(bare), np.zeros(model.nv)
+        qpos, qvel, qacc = data.qpos, data.qvel, data.qacc
+        for k in range(begin, min(begin + BLOCK, len(motion))):
+            qpos[:], qvel[:], qacc[:] = motion.qpos[k], motion.qvel[k], motion.qacc[k]
+            evaluate(bare, data, found[k])
+            if len(loads or ()):
+                external[:] = 0.0
+                frames.add(data, k, external)
+                found[k] -= external
+
+    in_threads(run, range(0, len(motion), BLOCK), jobs)
     bad = np.argwhere(~np.isfinite(found))
     if len(bad):
         raise StateError(f"the forces at time {motion.time[bad[0][0]]:g} s are not finite")

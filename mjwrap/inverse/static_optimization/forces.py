@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
 from mjwrap.inverse.muscle_analysis import MuscleAnalysis
-from mjwrap.inverse.static_optimization.programs import CHUNK, in_threads
+from mjwrap.inverse.static_optimization.programs import CHUNK
+from mjwrap.inverse.threads import in_threads
 from mjwrap.kernels.musculotendon.dispatch import DEGROOTE_FREGLY, MILLARD, PASSIVE, THELEN, has_fiber
 from mjwrap.kernels.musculotendon.fiber import ELASTIC, HEIGHT, MIN_ACTIVATION, OPTIMAL, SLACK
 from mjwrap.kernels.musculotendon.tangent import tangents
@@ -63,8 +64,8 @@ class Forces:
 
     def subset(self, frames: Flags) -> Forces:
         """Return the forces of some frames (T,)."""
-        parts = (x[frames] for x in (self.length, self.speed, self.rest, self.strength))
-        return Forces(self.law, self.params, *parts, self.curved, self.least)
+        per_frame = ("length", "speed", "rest", "strength")
+        return replace(self, **{name: getattr(self, name)[frames] for name in per_frame})
 
 
 def muscle_forces(

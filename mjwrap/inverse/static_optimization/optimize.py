@@ -35,8 +35,8 @@ SETTLED = 1e-9  # largest change of an activation with which relinearising ends
 MAX_ROUNDS = 60
 CAREFUL_ROUNDS = 20  # after which an activation goes only half of the way
 
-# The habits of OpenSim's StaticOptimization as options of `static_optimization`; docs/static_optimization.md has that of
-# its accelerations.
+# The habits of OpenSim's StaticOptimization as options of `static_optimization`. docs/static_optimization.md says how
+# to get its accelerations, too.
 OPENSIM_PARITY: dict[str, Any] = {"passive": False, "tendon": "rigid", "pennation": "opensim"}
 
 
@@ -60,8 +60,8 @@ def static_optimization(
     about the independent coordinates, F the tensions, r the reserves, τ the generalised forces of `inverse_dynamics`. F
     is affine in a with a rigid tendon. With an elastic one, and with Thelen's force-velocity curve, it is not: the
     optimisation is repeated with F linearised at its result until no activation changes by more than 1e-9. A tendon
-    cannot push: where a damped fibre would, its tension is zero, at its least activation, or its activation is more than
-    that from which it pulls.
+    cannot push: where a damped fibre would, the muscle is either at its least activation, without tension, or above the
+    activation from which it pulls.
 
     Args:
         muscles: of the model that moves. A smaller activation than the least one of a law counts as that, so it is
@@ -108,7 +108,7 @@ def static_optimization(
     high = np.maximum(low, high)
     given = Programs(
         analysis.moment_arm, forces.rest, forces.strength,
-        generalized_forces(muscles.model, motion, loads), cost, limits, low, high,
+        generalized_forces(muscles.model, motion, loads, threads), cost, limits, low, high,
     )  # fmt: skip
     found, used, unsettled = _solve_all(given, forces, threads)
     return _result(analysis, given, used, found, unsettled)
@@ -182,9 +182,9 @@ def _result(
     tension = np.where(idle, 0.0, np.maximum(used.force + found.activation * used.strength, 0.0))
     return StaticOptimization(
         time=analysis.time, names=analysis.names, coordinates=analysis.coordinates,
-        activation=np.where(idle, given.low, found.activation), tension=tension, reserve=found.reserve, moment=given.wanted,
-        optimal_reserve=given.reserves, moment_arm=analysis.moment_arm, solved=np.array([not reason for reason in reasons]),
-        reasons=tuple(reasons), residual=found.residual,
+        activation=np.where(idle, given.low, found.activation), tension=tension, reserve=found.reserve,
+        moment=given.wanted, optimal_reserve=given.reserves, moment_arm=analysis.moment_arm,
+        solved=np.array([not reason for reason in reasons]), reasons=tuple(reasons), residual=found.residual,
         saturated=(found.activation >= given.high) & (used.strength > 0.0),
         infeasible=found.infeasible, path_status=analysis.status,
     )  # fmt: skip

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from mjwrap.inverse.threads import in_threads
 from mjwrap.kernels.optimization.dual_newton import solve_frames
 from mjwrap.kernels.optimization.feasibility import prove_infeasible
 from mjwrap.kernels.optimization.optimality import optimality_residuals
@@ -97,7 +96,10 @@ def solve(programs: Programs, jobs: int = 1) -> Optima:
         missing, arms = wanted[part], programs.moment_arms[part]
         subtract_forces(pattern, arms, programs.force[part], missing)
         given = Frames(arms, programs.strength[part], missing, programs.low[part], programs.high[part])
-        found = Results(*(array[part] for array in results))
+        found = Results(
+            results.activation[part], results.reserve[part], results.dual[part],
+            results.status[part], results.iterations[part],
+        )  # fmt: skip
         solve_frames(pattern, given, objective, found, _work(len(pattern.row), muscles, rows))
         optimality_residuals(pattern, given, objective, found, residual[part], np.zeros(rows), np.zeros(rows))
         prove_infeasible(pattern, given, objective, found, infeasible[part])
@@ -108,17 +110,6 @@ def solve(programs: Programs, jobs: int = 1) -> Optima:
     reserve = np.empty_like(results.reserve)
     reserve[:, order] = results.reserve
     return Optima(results.activation, reserve, status, residual, results.iterations, infeasible)
-
-
-def in_threads(run: Callable[[int], None], begins: Iterable[int], jobs: int) -> None:
-    """Call a function for every chunk, `jobs` of them at a time."""
-    if jobs == 1:
-        for begin in begins:
-            run(begin)
-        return
-    with ThreadPoolExecutor(jobs) as pool:
-        for _ in pool.map(run, begins):
-            pass
 
 
 def used_entries(moment_arms: Array) -> NDArray[np.bool_]:

@@ -112,7 +112,7 @@ def _balanced(unit, force, low, high):
 
 @jit
 def _imbalance(unit, x):
-    """Return the tendon's force [F_max] and its slope in fibre length x [l_o], the fibre's, its slopes in x and activation.
+    """Return tendon force and its slope in fibre length x [l_o]; fibre force, its slopes in x and activation [F_max].
 
     unit: curves, activation, damping, fibre height [l_o], l_o / l_s, length [l_s] and speed [v_max l_o] of the unit.
     """
