@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mjwrap.errors import StateError
 from mjwrap.osim.verifying.driven import driven_cause
-from mjwrap.osim.verifying.imported import ImportedModel, ImportedNumbers
+from mjwrap.osim.verifying.imported import ImportedModel, ImportedNumbers, SimulatedMotion
 from mjwrap.osim.verifying.reasons import LARGE, UNEXPLAINED, Geodesic, arm_reason, length_reason
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers, Reference
 
@@ -240,25 +240,36 @@ def _compare_motion(
     every: dict[str, Quantity], found: Verification, imported: ImportedModel, name: str, motion: MotionNumbers
 ) -> None:
     try:
-        ours, change = imported.motion(motion)
+        ours = imported.motion(motion)
     except StateError as error:
         found.missing.append(f"the {name}: {error}")
         return
-    quantity = Quantity(f"coordinates in the {name}, {motion.time[-1]:g} s", "rad, m", 1e-4)
-    lost = abs(motion.energy[-1] - motion.energy[0]) if motion.energy else 0.0
-    for coordinate, values in ours.items():
-        theirs = np.array(motion.coordinates[coordinate])
-        k = int(np.argmax(np.abs(values - theirs)))
-        gap = float(values[k] - theirs[k])
-        quantity.add(gap, coordinate)
-        if not abs(gap) <= LARGE:
-            why = f"{UNEXPLAINED}: motion"
-            if lost > LOSS and abs(change) < 0.01 * lost:
-                why = f"OpenSim's motion changes its energy by {lost:.2g} J, mjwrap's by {abs(change):.1g} J"
-            elif motion.excitation is not None:
-                why = driven_cause(imported, motion, motion.time[k]) or why
+    quantity = every[name] = Quantity(f"coordinates in the {name}, {motion.time[-1]:g} s", "rad, m", 1e-4)
+    couplings = every[f"{name}, couplings"] = Quantity(f"coupled joints in the {name}", "rad, m", 5e-6)
+    for joint, error in ours.coupling_errors.items():
+        couplings.add(error, joint)
+    gaps = {n: values - np.array(motion.coordinates[n]) for n, values in ours.coordinates.items()}
+    large = [n for n, gap in gaps.items() if not np.abs(gap).max(initial=0.0) <= LARGE]
+    why = _motion_reason(imported, motion, ours, [gaps[n] for n in large]) if large else ""
+    for coordinate, gap in gaps.items():
+        k = int(np.argmax(np.abs(gap)))
+        quantity.add(float(gap[k]), coordinate)
+        if coordinate in large:
+            theirs = motion.coordinates[coordinate][k]
             place = f"{coordinate}, {motion.time[k]:g} s"
             found.differences.append(
-                Difference(name, place, 0, float(theirs[k]), float(values[k]), "rad, m", why)
+                Difference(name, place, 0, theirs, theirs + float(gap[k]), "rad, m", why)
             )
-    every[name] = quantity
+
+
+def _motion_reason(
+    imported: ImportedModel, motion: MotionNumbers, ours: SimulatedMotion, gaps: list[Array]
+) -> str:
+    """Return why coordinates differ along a motion, from OpenSim's energy or from its muscles up to where they begin to."""
+    lost = abs(motion.energy[-1] - motion.energy[0]) if motion.energy else 0.0
+    if lost > LOSS and abs(ours.energy_change) < 0.01 * lost:
+        return f"OpenSim's motion changes its energy by {lost:.2g} J, mjwrap's by {abs(ours.energy_change):.1g} J"
+    begin = min(int(np.argmax(~(np.abs(gap) <= LARGE))) for gap in gaps)
+    until = next((s.frame for s in motion.samples if s.frame >= begin), begin)
+    cause = driven_cause(imported, motion, motion.time[until]) if motion.samples else ""
+    return cause or f"{UNEXPLAINED}: motion"

@@ -59,6 +59,16 @@ class SampleNumbers:
     missing_with_theirs: float
 
 
+@dataclass(frozen=True)
+class SimulatedMotion:
+    """A motion of an imported model: coordinates (frames,), the change of its energy [J], NaN if muscles acted, and how
+    far joints were at most from where their leaders put them [rad or m]."""
+
+    coordinates: Mapping[str, Array]
+    energy_change: float
+    coupling_errors: Mapping[str, float]
+
+
 class ImportedModel:
     """An imported model, evaluated at OpenSim's poses."""
 
@@ -166,26 +176,27 @@ class ImportedModel:
             moments.append(inertia.copy())
         return n.T @ np.array(moments).reshape(-1, model.nv).T
 
-    def motion(
-        self, given: MotionNumbers, timestep: float | None = None
-    ) -> tuple[Mapping[str, Array], float]:
-        """Return the coordinates (frames,) along the motion that starts as OpenSim's did, and the change of energy [J].
+    def motion(self, given: MotionNumbers, timestep: float | None = None) -> SimulatedMotion:
+        """Return the motion that starts as OpenSim's did.
 
-        timestep [s]: None for the model's own. A passive motion is that without muscles; the energy is NaN for others.
+        timestep [s]: None for the model's own; the equalities' time constants change with it. A passive motion is that
+        without muscles.
         """
         model = self.model
-        before, flags = model.opt.timestep, int(model.opt.enableflags)
+        before, flags, constants = model.opt.timestep, int(model.opt.enableflags), model.eq_solref.copy()
         model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
         if timestep is not None:
             model.opt.timestep = timestep
+            model.eq_solref[:, 0] *= timestep / before
         try:
             return self._motion(given)
         finally:
             model.opt.timestep, model.opt.enableflags = before, flags
+            model.eq_solref[:] = constants
 
-    def _motion(self, given: MotionNumbers) -> tuple[Mapping[str, Array], float]:
+    def _motion(self, given: MotionNumbers) -> SimulatedMotion:
         model, muscles = self.model, self.muscles
-        data = mujoco.MjData(model)
+        data, couplings = mujoco.MjData(model), CoupledJoints(self.model)
         passive = given.excitation is None
         if passive:
             free = {n: given.coordinates[n][0] for n in self.settable if n in given.coordinates}
@@ -197,15 +208,20 @@ class ImportedModel:
         mujoco.mj_forward(model, data)
         energy = float(data.energy.sum())
         rows: dict[str, list[float]] = {}
+        apart: dict[str, float] = {}
         for time in given.time:
             steps = round((time - data.time) / model.opt.timestep)
             if steps > 0:
                 self._step(data, steps, PASSIVE_OFF if passive else DRIVEN_OFF)
             for name, value in coordinates(model, data).items():
                 rows.setdefault(name, []).append(value)
+            for joint, error in couplings.residuals(data.qpos).items():
+                name = model.joint(joint).name
+                apart[name] = max(apart.get(name, 0.0), abs(error))
         mujoco.mj_forward(model, data)
         change = float(data.energy.sum()) - energy if passive else float("nan")
-        return {name: np.array(rows[name]) for name in given.coordinates if name in rows}, change
+        found = {name: np.array(rows[name]) for name in given.coordinates if name in rows}
+        return SimulatedMotion(found, change, apart)
 
     def at_sample(self, motion: MotionNumbers, sample: MotionSample) -> SampleNumbers:
         """Return the muscles' numbers at a state of OpenSim's driven motion."""
