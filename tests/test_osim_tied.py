@@ -13,6 +13,8 @@ from osim_models import FROZEN, compiled, imported
 import mjwrap as mw
 from mjwrap.osim.verifying.imported import ImportedModel
 from mjwrap.osim.verifying.reference import read_reference
+from mjwrap.runs.models import set_state
+from mjwrap.runs.state_tables import read_states
 
 OWN = ("tied_point", "tied_distance", "tied_weld")
 SHARED = ("ThoracoscapularShoulderModel", "knee_patella_ligament")
@@ -202,3 +204,33 @@ def test_a_coordinate_that_equalities_hold_has_no_moment_arm() -> None:
         muscles.moment_arms(data, "q")
     data.eq_active[:] = 0
     assert abs(muscles.moment_arms(data, "q")[0, 0]) > 0.1
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+@pytest.mark.parametrize("name", ["tied_distance", "ThoracoscapularShoulderModel"])
+def test_a_motion_of_opensims_coordinates_alone_is_a_motion_of_the_model(name: str, degrees: bool) -> None:
+    """Axes of an ellipsoid, and joints of a coordinate that no joint shows, follow from the constraints."""
+    model, data = tied(name), mujoco.MjData(tied(name))
+    start, names, rows = values(name), settable(name), []
+    for t in np.linspace(0.0, 1.0, 5):
+        mw.osim.set_coordinates(model, data, {names[0]: start[names[0]] - 0.2 * np.sin(3.0 * t)})
+        rows.append(data.qpos.copy())
+    time = 0.1 * np.arange(5)
+    whole = mw.osim.motion_table(model, time, rows)
+    kept = [n for n in names if n in whole.names]
+    given = np.column_stack([whole[n] for n in kept])
+    if degrees:
+        stay = np.array([n in ("block_slide", "patella_angle") for n in kept])  # OpenSim calls the latter coupled
+        given[:, ~stay] = np.degrees(given[:, ~stay])
+    table = mw.Table(time, tuple(kept), given, {"inDegrees": "yes" if degrees else "no"})
+    found = read_states(model, mw.MuscleSystem(model), mujoco.MjData(model), table)
+    np.testing.assert_allclose(found.qpos, rows, rtol=0, atol=1e-9)
+
+
+def test_a_start_closes_the_loops() -> None:
+    model, data = tied("tied_weld"), mujoco.MjData(tied("tied_weld"))
+    set_state(model, data, -1, {"q1": 0.2})
+    assert data.qpos[model.joint("q1").qposadr[0]] == 0.2
+    assert residual(model, data) < 1e-10
+    with pytest.raises(mw.StateError, match="equality 'weld' \\(weld\\) is off by"):
+        set_state(model, data, -1, {"q1": 0.2, "p_x": 0.29})
