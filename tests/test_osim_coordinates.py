@@ -92,7 +92,10 @@ def test_coordinates_that_are_functions_of_a_joint(simple: mujoco.MjModel) -> No
     assert mw.osim.coordinates(simple, data)["inverse"] == pytest.approx(1.5, abs=1e-15)
     mw.osim.set_coordinates(simple, data, mw.osim.coordinates(simple, data))
     assert mw.MuscleSystem(simple).n == 0  # these tuples are no muscles
-    for value, position in ((-1.0, 0.1**2 - 2.0 * 0.1 * 1.1), (3.0, 4.0 + 5.0)):  # straight lines beyond the range
+    for value, position in (
+        (-1.0, 0.1**2 - 2.0 * 0.1 * 1.1),
+        (3.0, 4.0 + 5.0),
+    ):  # straight lines beyond the range
         mw.osim.set_coordinates(simple, data, {"inverse": value})
         assert mw.osim.coordinates(simple, data)["shown"] == pytest.approx(position, abs=1e-14)
         assert mw.osim.coordinates(simple, data)["inverse"] == pytest.approx(value, abs=1e-14)
@@ -169,7 +172,7 @@ def test_data_of_another_model_and_a_wrong_declaration(simple: mujoco.MjModel, m
         ),
         (
             '<element objtype="joint" objname="shown" prm="1"/><element objtype="numeric" objname="g"/>',
-            "tuple 'mjwrap_coordinate_x' must list a joint and then a numeric and, as the joint has prm=1, a second one",
+            "tuple 'mjwrap_coordinate_x' must list a joint and then a numeric and, as the joint has prm=1, a second",
         ),
         (
             '<element objtype="joint" objname="shown" prm="1"/><element objtype="numeric" objname="g"/>'

@@ -200,7 +200,9 @@ def test_a_coordinate_that_equalities_hold_has_no_moment_arm() -> None:
         </mujoco>"""
     )
     muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
-    with pytest.raises(mw.GeometryError, match="'q' cannot move at this pose: equalities of the model hold it"):
+    with pytest.raises(
+        mw.GeometryError, match="'q' cannot move at this pose: equalities of the model hold it"
+    ):
         muscles.moment_arms(data, "q")
     data.eq_active[:] = 0
     assert abs(muscles.moment_arms(data, "q")[0, 0]) > 0.1
@@ -215,12 +217,14 @@ def test_a_motion_of_opensims_coordinates_alone_is_a_motion_of_the_model(name: s
     for t in np.linspace(0.0, 1.0, 5):
         mw.osim.set_coordinates(model, data, {names[0]: start[names[0]] - 0.2 * np.sin(3.0 * t)})
         rows.append(data.qpos.copy())
-    time = 0.1 * np.arange(5)
+    time = np.linspace(0.0, 0.4, 5)
     whole = mw.osim.motion_table(model, time, rows)
     kept = [n for n in names if n in whole.names]
     given = np.column_stack([whole[n] for n in kept])
     if degrees:
-        stay = np.array([n in ("block_slide", "patella_angle") for n in kept])  # OpenSim calls the latter coupled
+        stay = np.array(
+            [n in ("block_slide", "patella_angle") for n in kept]
+        )  # OpenSim calls the latter coupled
         given[:, ~stay] = np.degrees(given[:, ~stay])
     table = mw.Table(time, tuple(kept), given, {"inDegrees": "yes" if degrees else "no"})
     found = read_states(model, mw.MuscleSystem(model), mujoco.MjData(model), table)

@@ -3,7 +3,8 @@
 A tuple "mjwrap_coordinate_NAME" lists a joint and a numeric with a piecewise polynomial: the coordinate as a function
 of the joint's qpos. With prm="1" of the joint, or prm="2" for a coordinate that is an angle, it is the other way round:
 the numeric is the joint's qpos as a function of the coordinate, which rises or falls within the range in a second
-numeric, and goes on straight beyond it. Such a coordinate can be set. A tuple "mjwrap_axes" lists joints that are axes of a joint only.
+numeric, and goes on straight beyond it. Such a coordinate can be set. A tuple "mjwrap_axes" lists joints that are axes
+of a joint only.
 """
 
 from __future__ import annotations
@@ -109,7 +110,11 @@ def read_coordinate_functions(model: mujoco.MjModel) -> dict[str, CoordinateFunc
         if kinds != wanted:
             raise ModelError(
                 f"tuple '{label}' must list a joint and then a numeric"
-                + (f" and, as the joint has prm={mark:g}, a second one with the range of the coordinate" if own else "")
+                + (
+                    f" and, as the joint has prm={mark:g}, a second one with the range of the coordinate"
+                    if own
+                    else ""
+                )
             )
         extent = _extent(model, elements[2][1]) if own else None
         pieces = read_pieces(model, elements[1][1])

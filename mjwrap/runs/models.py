@@ -65,8 +65,9 @@ def start_state(
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Mapping[str, float]) -> None:
     """Reset data to a keyframe (-1: to qpos0), then set hinges and slides to positions [rad, m] by name.
 
-    Joints that follow them, or that other equalities tie to them, and are not given themselves, are set too. Warns if a position lies outside its joint's
-    range. Raises `StateError` if no pose with these positions satisfies the equalities, `ModelError` for a name that is not a hinge or slide, and for positions that only degrees can explain
+    Joints that follow them, or that other equalities tie to them, and are not given themselves, are set too. Warns if a
+    position lies outside its joint's range. Raises `StateError` if no pose with these positions satisfies the
+    equalities, `ModelError` for a name that is not a hinge or slide, and for positions that only degrees can explain
     (`check_position`).
     """
     if key >= 0:
@@ -83,7 +84,9 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: M
         _place_tied(model, data, given, before)
 
 
-def _place_tied(model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], before: NDArray[np.float64]) -> None:
+def _place_tied(
+    model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], before: NDArray[np.float64]
+) -> None:
     """Move joints that equalities other than couplings tie to these joints, which stay where the data have them.
 
     before (nq,): the pose from which all of them come. Raises `StateError` if no pose satisfies the equalities.

@@ -215,7 +215,9 @@ class _Reader:
         placed = self._place_followers()
         tied = place_tied(model, self.start, self.table, arrays["qpos"], self.found["qpos"])
         if tied:
-            dofs = [d for d in (int(model.joint(name).dofadr[0]) for name in tied) if d not in self.found["qvel"]]
+            dofs = [
+                d for d in (int(model.joint(name).dofadr[0]) for name in tied) if d not in self.found["qvel"]
+            ]
             arrays["qvel"][:, dofs] = _differences(model, time, arrays["qpos"])[:, dofs]
             remarks.append(
                 f"{counted(len(tied), 'position')} missing, of joints that equalities tie to others: {_few(tied)}"

@@ -37,8 +37,8 @@ class Projection:
 
         given: positions by joint id, of hinges and slides that follow no other. Joints that follow are set by their
         couplings; others that equalities tie move as little as possible, step by step, in the sum of squares of all
-        coordinates. Where given positions that equalities tie to each other leave errors up to `nearly` [m or rad], they
-        are moved, too. Nothing is written to the data. Raises `StateError` if the equalities cannot be satisfied.
+        coordinates. Where given positions that equalities tie to each other leave errors up to `nearly` [m or rad],
+        they are moved, too. Nothing is written to the data. Raises `StateError` if the equalities cannot be satisfied.
         """
         model = self.model
         at = model.jnt_qposadr[list(given)]
@@ -77,7 +77,7 @@ class Projection:
         return tied
 
     def _settled(
-        self, data: mujoco.MjData, qpos: Array, dofs: Array, hold: bool
+        self, data: mujoco.MjData, qpos: Array, dofs: NDArray[np.int32], hold: bool
     ) -> tuple[Array, Errors]:
         """Return the pose near qpos that satisfies the equalities, or the best one found, and their errors.
 

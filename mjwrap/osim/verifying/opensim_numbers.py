@@ -24,7 +24,10 @@ WIDEST = {
 }  # half width of random values [rad, m], by OpenSim's type of a coordinate's motion
 ASSEMBLED = 1e-10  # largest error of OpenSim's constraints at a pose [m or rad]
 HALVINGS = 8  # how often a pose is drawn nearer to the default one
-RANK, MOVES = 1e-10, 1e-9  # shares of the largest singular value, and of a coordinate's own motion, that count
+RANK, MOVES = (
+    1e-10,
+    1e-9,
+)  # shares of the largest singular value, and of a coordinate's own motion, that count
 SAME = 1e-12  # difference of speeds from the coordinates' rates that is rounding
 PASSIVE, DRIVEN = 0.3, 0.5  # durations of motions [s]
 EXCITATION = 0.2
@@ -198,9 +201,9 @@ class _Computer:
         return found
 
     def _mass(self) -> tuple[list[list[float]] | None, list[list[float]] | None]:
-        """Return NᵀMN about the rates of the independent coordinates, and each coordinate's speed u from all rates if they differ.
+        """Return NᵀMN about the rates of the independent coordinates, and each one's speed u from all rates.
 
-        Column i of N is P eᵢ / Pᵢᵢ, with the projector P on the rates that satisfy Simbody's constraints.
+        The latter is None where speeds and rates are the same. Column i of N is P eᵢ / Pᵢᵢ, with the projector P on the rates that satisfy Simbody's constraints.
         """
         model, state, opensim = self.model, self.state, self.opensim
         matter = model.getMatterSubsystem()

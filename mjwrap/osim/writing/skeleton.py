@@ -184,7 +184,9 @@ class _Writer:
         self.report.add("Coordinate", name, EXACT, f"joint '{substitute.joint}' is a function of it, in {count} "
                         f"piece{'s' * (count > 1)}; what follows it follows the joint")  # fmt: skip
 
-    def tuple(self, name: str, joint: str, mark: float | None, numerics: Mapping[str, Iterable[float]]) -> None:
+    def tuple(
+        self, name: str, joint: str, mark: float | None, numerics: Mapping[str, Iterable[float]]
+    ) -> None:
         """Write the tuple of a coordinate: a joint with a mark, and numerics by the ends of their names."""
         record = self.document.add("custom", "tuple", name=f"{COORDINATE}{name}")
         self.document.add(record, "element", objtype="joint", objname=joint, prm=mark)
