@@ -3,8 +3,8 @@
     python benchmarks/osim/replay_motion.py MODEL.osim [--frozen FILE.json]
 
 Needs the package opensim. The motion, seeded sines of the independent coordinates that satisfies all constraints, is
-written as .mot and .sto; OpenSim reads each as a Storage and as a TimeSeriesTable, and its MuscleAnalysis runs along it. Printed: largest differences.
---frozen keeps OpenSim's lengths and moment arms at the motion for the tests.
+written as .mot and .sto; OpenSim reads each as a Storage and as a TimeSeriesTable, and its MuscleAnalysis runs along
+it. Printed: largest differences. --frozen keeps OpenSim's lengths and moment arms at the motion for the tests.
 """
 
 import argparse

@@ -37,9 +37,9 @@ class CoordinateMotions:
     """The motions q̇ (nv,) of a model as a coordinate has the rate 1 and its equalities hold.
 
     Joints that follow by couplings move along. Where other equalities tie coordinates, the motion is the one whose
-    rates of all coordinates have the least sum of squares: P eᵢ / Pᵢᵢ, with the projector P on the motions that satisfy the
-    equalities, as in OpenSim's moment arms. A joint that an equality holds at a position moves as if that one did not
-    exist.
+    rates of all coordinates have the least sum of squares: P eᵢ / Pᵢᵢ, with the projector P on the motions that satisfy
+    the equalities, as in OpenSim's moment arms. A joint that an equality holds at a position moves as if that one did
+    not exist.
     """
 
     def __init__(self, model: mujoco.MjModel, couplings: CoupledJoints) -> None:
