@@ -51,16 +51,16 @@ def test_moment_arms_are_slopes_along_the_coupled_motion(made: Knee) -> None:
 
 
 def test_moment_arms_about_followers_are_those_of_their_leaders_by_the_slope(made: Knee) -> None:
-    """The wheel follows two joints: of all motions that turn it at rate 1, the least one has rates like their factors."""
+    """The wheel follows two joints: of all motions that turn it at rate 1, the least has rates like their factors."""
     model = made.model
     muscles, data = mw.MuscleSystem(model), mujoco.MjData(model)
     data.qpos[:] = made.follow(model, np.random.default_rng(2).uniform(-0.9, -0.6, model.nq))
     couplings = CoupledJoints(model)
     matrix = couplings.matrix(data.qpos)
-    about = {name: muscles.moment_arms(data, name)[:, 0] for name in ("hip", "knee", "ankle", "glide", "wheel")}
-    leaders = [
-        model.joint(name).dofadr[0] == couplings.independent for name in ("hip", "knee", "ankle")
-    ]
+    about = {
+        name: muscles.moment_arms(data, name)[:, 0] for name in ("hip", "knee", "ankle", "glide", "wheel")
+    }
+    leaders = [model.joint(name).dofadr[0] == couplings.independent for name in ("hip", "knee", "ankle")]
     hip, knee, ankle = (int(np.flatnonzero(each)[0]) for each in leaders)
     slope = matrix[model.joint("glide").dofadr[0], knee]
     np.testing.assert_allclose(about["glide"] * slope, about["knee"], rtol=0, atol=1e-12)

@@ -8,6 +8,7 @@ import pytest
 from coupling_models import Knee, installed, knee
 
 import mjwrap as mw
+from mjwrap.mjcf.coordinate_functions import CoordinateFunction
 from mjwrap.mjcf.couplings import CoupledJoints
 
 
@@ -65,11 +66,11 @@ SIMPLE = """<mujoco><worldbody>
 <equality><joint joint1="locked_one" polycoef="0 0 0 0 0"/>
   <joint joint1="grip" joint2="elbow_flexion" polycoef="0 .1 0 0 0"/></equality>
 <custom><numeric name="f" data="1 0 5 2"/><numeric name="g" data="2 1 0 1 0 0 1 1 1 2"/>
-  <numeric name="bad" data="2 1 0"/>
+  <numeric name="bad" data="2 1 0"/><numeric name="range" data=".1 2"/>
   <tuple name="mjwrap_coordinate_patella"><element objtype="joint" objname="elbow_flexion"/>
     <element objtype="numeric" objname="f"/></tuple>
   <tuple name="mjwrap_coordinate_inverse"><element objtype="joint" objname="shown" prm="1"/>
-    <element objtype="numeric" objname="g"/></tuple>{}</custom></mujoco>"""
+    <element objtype="numeric" objname="g"/><element objtype="numeric" objname="range"/></tuple>{}</custom></mujoco>"""
 
 
 @pytest.fixture
@@ -78,20 +79,44 @@ def simple() -> mujoco.MjModel:
 
 
 def test_coordinates_that_are_functions_of_a_joint(simple: mujoco.MjModel) -> None:
-    """The pieces of "inverse" are q² below 1, and 1 + (q - 1) + 2 (q - 1)² above."""
+    """And one of which the joint is a function f: c² below 1, and 1 + (c - 1) + 2 (c - 1)² above."""
     data = mujoco.MjData(simple)
-    mw.osim.set_coordinates(simple, data, {"elbow_flexion": 0.5, "inverse": 0.49})
+    mw.osim.set_coordinates(simple, data, {"elbow_flexion": 0.5, "inverse": 0.7})
     found = mw.osim.coordinates(simple, data)
     assert found["patella"] == pytest.approx(6.0, abs=1e-15)
     assert found["grip"] == pytest.approx(0.25, abs=1e-15)
-    assert found["shown"] == pytest.approx(0.7, abs=1e-12)
-    mw.osim.set_coordinates(simple, data, {"inverse": 1.0 + 0.5 + 2.0 * 0.25})
-    assert mw.osim.coordinates(simple, data)["shown"] == pytest.approx(1.5, abs=1e-12)
-    assert mw.osim.coordinates(simple, data)["inverse"] == pytest.approx(2.0, abs=1e-12)
+    assert found["shown"] == 0.7**2
+    assert found["inverse"] == pytest.approx(0.7, abs=1e-15)
+    mw.osim.set_coordinates(simple, data, {"inverse": 1.5})
+    assert mw.osim.coordinates(simple, data)["shown"] == 1.0 + 0.5 + 2.0 * 0.25
+    assert mw.osim.coordinates(simple, data)["inverse"] == pytest.approx(1.5, abs=1e-15)
     mw.osim.set_coordinates(simple, data, mw.osim.coordinates(simple, data))
     assert mw.MuscleSystem(simple).n == 0  # these tuples are no muscles
-    with pytest.raises(mw.StateError, match="'inverse' cannot be -1: joint 'shown' has no position for it"):
-        mw.osim.set_coordinates(simple, data, {"inverse": -1.0})
+    for value, position in (
+        (-1.0, 0.1**2 - 2.0 * 0.1 * 1.1),
+        (3.0, 4.0 + 5.0),
+    ):  # straight lines beyond the range
+        mw.osim.set_coordinates(simple, data, {"inverse": value})
+        assert mw.osim.coordinates(simple, data)["shown"] == pytest.approx(position, abs=1e-14)
+        assert mw.osim.coordinates(simple, data)["inverse"] == pytest.approx(value, abs=1e-14)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rates_and_inverses_of_declared_coordinates(sign: float) -> None:
+    """A function that rises or falls: its inverse to rounding, and its rate by differences of second order."""
+    rng = np.random.default_rng(4)
+    rows = np.array([[0.0, 1.0, 0.3, -0.1], [1.2, 1.3, 0.5, 0.2]]) * sign
+    function = CoordinateFunction(0, (-0.5, 2.0), np.array([1.0]), np.array([0.0, 1.0]), rows)
+    for value in rng.uniform(-1.0, 3.0, 50):
+        position = function.position(float(value))
+        assert function.value(position) == pytest.approx(value, abs=1e-14)
+        if min(abs(value - edge) for edge in (-0.5, 1.0, 2.0)) < 2e-3:
+            continue
+        slopes = [
+            (function.value(position + step) - function.value(position - step)) / (2.0 * step)
+            for step in (1e-3, 5e-4)
+        ]
+        assert (4.0 * slopes[1] - slopes[0]) / 3.0 == pytest.approx(function.rate(position), abs=1e-9)
 
 
 def test_a_value_outside_the_range_is_set_as_it_is(simple: mujoco.MjModel) -> None:
@@ -144,6 +169,15 @@ def test_data_of_another_model_and_a_wrong_declaration(simple: mujoco.MjModel, m
         (
             '<element objtype="joint" objname="grip"/><element objtype="numeric" objname="bad"/>',
             "numeric 'bad' is not a piecewise polynomial",
+        ),
+        (
+            '<element objtype="joint" objname="shown" prm="1"/><element objtype="numeric" objname="g"/>',
+            "tuple 'mjwrap_coordinate_x' must list a joint and then a numeric and, as the joint has prm=1, a second",
+        ),
+        (
+            '<element objtype="joint" objname="shown" prm="1"/><element objtype="numeric" objname="g"/>'
+            '<element objtype="numeric" objname="f"/>',
+            "numeric 'f' must be the lowest and the highest value of a coordinate",
         ),
     ):
         text = SIMPLE.format(f'<tuple name="mjwrap_coordinate_x">{elements}</tuple>')

@@ -1,4 +1,4 @@
-"""Write three small OpenSim models whose coordinates are tied by constraints, and freeze OpenSim's moment arms for them.
+"""Write three small OpenSim models whose coordinates constraints tie, and freeze OpenSim's moment arms for them.
 
     python benchmarks/osim/freeze_tied_arms.py tests/data/osim [--poses 6] [--seed 3]
 
@@ -36,7 +36,9 @@ class Builder:
         self.places[name] = body
         return body
 
-    def joint(self, kind: str, name: str, parent: str, at: tuple, child: str, coordinates: dict, *more) -> None:
+    def joint(
+        self, kind: str, name: str, parent: str, at: tuple, child: str, coordinates: dict, *more
+    ) -> None:
         """Add a joint at a place of its parent, at the origin of a new body; coordinates: range by name."""
         body, zero = self.body(child), opensim.Vec3(0.0)
         frames = (self.places[parent], opensim.Vec3(*at), zero, body, zero, zero)
@@ -90,7 +92,9 @@ def tied_point() -> opensim.Model:
 def tied_distance() -> opensim.Model:
     made = Builder("tied_distance")
     made.joint("PinJoint", "knee", "ground", (0, -0.4, 0), "shank", {"knee_angle": (-1.5, 0.1, -0.3)})
-    made.joint("SliderJoint", "slide", "shank", (0.0, -0.06, 0), "block", {"block_slide": (-0.03, 0.03, 0.005)})
+    made.joint(
+        "SliderJoint", "slide", "shank", (0.0, -0.06, 0), "block", {"block_slide": (-0.03, 0.03, 0.005)}
+    )
     transform = opensim.SpatialTransform()
     across = {2: ((0.0, 0.0, 1.0), (-1.1, -0.5, 0.1)), 3: ((1.0, 0.0, 0.0), (0.016, 0.042, 0.05)),
               4: ((0.0, 1.0, 0.0), (-0.43, -0.40, -0.37))}  # fmt: skip
@@ -125,7 +129,9 @@ def tied_weld() -> opensim.Model:
     made = Builder("tied_weld")
     wide = (-1.0, 1.0)
     made.joint("UniversalJoint", "j1", "ground", (0, 0, 0), "first", {"q1": (*wide, 0.1), "q2": (*wide, 0.5)})
-    made.joint("UniversalJoint", "j2", "first", (0.3, 0, 0), "second", {"q3": (*wide, 0.2), "q4": (*wide, -0.6)})
+    made.joint(
+        "UniversalJoint", "j2", "first", (0.3, 0, 0), "second", {"q3": (*wide, 0.2), "q4": (*wide, -0.6)}
+    )
     names = ("p_1", "p_2", "p_3", "p_x", "p_y", "p_z")
     transform = opensim.SpatialTransform()
     for i, name in enumerate(names):
@@ -141,7 +147,8 @@ def tied_weld() -> opensim.Model:
     made.model.getJointSet().get("j5").upd_coordinates(0).set_locked(True)
     zero = opensim.Vec3(0.0)
     weld = opensim.WeldConstraint("weld", made.places["second"], opensim.Vec3(0.25, 0.02, 0), zero,
-                                  made.places["plate"], opensim.Vec3(0.02, 0.03, 0), opensim.Vec3(0, 0, 0.4))  # fmt: skip
+                                  made.places["plate"], opensim.Vec3(0.02, 0.03, 0),
+                                  opensim.Vec3(0, 0, 0.4))  # fmt: skip
     made.model.addConstraint(weld)
     made.path("a", ("ground", (0.1, 0.2, 0.02)), ("second", (0.1, 0.04, 0.0)))
     made.path("b", ("first", (0.1, 0.05, 0.0)), ("plate", (0.05, 0.05, 0.01)), ("arm", (0.1, 0.02, 0.0)))

@@ -2,9 +2,10 @@
 
     python benchmarks/osim/replay_motion.py MODEL.osim [--motion FILE.mot] [--frozen FILE.json]
 
-Needs the package opensim. The motion, seeded sines of the independent coordinates, is written as .mot and .sto; OpenSim
-reads each as a Storage and as a TimeSeriesTable, and its MuscleAnalysis runs along it. Printed: largest differences.
---motion takes the motion that `mjwrap run --motion` wrote instead. --frozen keeps OpenSim's lengths and moment arms at the motion for the tests.
+Needs the package opensim. The motion, seeded sines of the independent coordinates that satisfies all constraints, is
+written as .mot and .sto; OpenSim reads each as a Storage and as a TimeSeriesTable, and its MuscleAnalysis runs along
+it. Printed: largest differences. --motion takes the motion that `mjwrap run --motion` wrote instead. --frozen keeps
+OpenSim's lengths and moment arms at the motion for the tests.
 """
 
 import argparse
@@ -29,8 +30,8 @@ def motion(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     time = np.linspace(0.0, 1.0, 11)
     rows = []
     for t in time:
-        values = {n: start[n] + sizes[n] * np.sin(3.0 * t) for n in names}
-        mw.osim.set_coordinates(model, data, values)
+        for name in names:  # one by one: what constraints tie to it moves along
+            mw.osim.set_coordinates(model, data, {name: start[name] + sizes[name] * np.sin(3.0 * t)})
         rows.append(data.qpos.copy())
     return time, np.array(rows)
 
@@ -66,15 +67,19 @@ def main() -> None:
             storage = opensim.Storage(str(file))
             assert columns.getNumRows() == storage.getSize() == len(time)
             assert not storage.isInDegrees()
-            numbers = replay(options.model, file, Path(folder), table)
+            about = mw.MuscleSystem(model).coordinates
+            numbers = replay(options.model, file, Path(folder), table, about)
             compare(model, qpos, numbers, suffix)
     if options.frozen:
         given = {"made by": "benchmarks/osim/replay_motion.py", "OpenSim": opensim.GetVersion()}
         options.frozen.write_text(json.dumps(given | {"model": options.model.name} | numbers) + "\n")
 
 
-def replay(path: Path, file: Path, folder: Path, table: mw.Table) -> dict:
-    """Return coordinates, lengths and moment arms that OpenSim has along the motion in a file."""
+def replay(path: Path, file: Path, folder: Path, table: mw.Table, about: list[str]) -> dict:
+    """Return coordinates, lengths and moment arms that OpenSim has along the motion in a file.
+
+    about: coordinates of the moment arms; OpenSim writes NaN about some that follow others.
+    """
     model = opensim.Model(str(path))
     analysis = opensim.MuscleAnalysis()
     analysis.setComputeMoments(True)
@@ -100,7 +105,7 @@ def replay(path: Path, file: Path, folder: Path, table: mw.Table) -> dict:
         if name in table.names:
             found["coordinates"][name] = table[name].tolist()
         arms = folder / f"back_MuscleAnalysis_MomentArm_{name}.sto"
-        if arms.exists():
+        if arms.exists() and name in about:
             read = mw.read_table(arms)
             found["moment_arms"][name] = {muscle: read[muscle].tolist() for muscle in read.names}
     return found

@@ -1,9 +1,10 @@
 """Read the coordinates of an imported model that are no joint's qpos, and the joints that are no coordinates.
 
 A tuple "mjwrap_coordinate_NAME" lists a joint and a numeric with a piecewise polynomial: the coordinate as a function
-of the joint's qpos. With prm="1" of the joint it is the other way round: the numeric is the joint's qpos as a function
-of the coordinate, which rises or falls within the range in a second numeric, and goes on straight beyond it. Such a
-coordinate can be set. A tuple "mjwrap_axes" lists joints that are axes of a joint only.
+of the joint's qpos. With prm="1" of the joint, or prm="2" for a coordinate that is an angle, it is the other way round:
+the numeric is the joint's qpos as a function of the coordinate, which rises or falls within the range in a second
+numeric, and goes on straight beyond it. Such a coordinate can be set. A tuple "mjwrap_axes" lists joints that are axes
+of a joint only.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from mjwrap.mjcf.tuple_names import AXES, COORDINATE
 
 OBJ = mujoco.mjtObj
 Array = NDArray[np.float64]
+LENGTH, ANGLE = 1.0, 2.0  # prm of the joint of a coordinate that can be set
 STEEPEST = 1e12  # rate of a coordinate where its joint stands still
 
 
@@ -30,7 +32,8 @@ class CoordinateFunction:
     """A coordinate that is a function of a joint (id), or of which the joint is a function.
 
     extent: the range of the coordinate in which the joint is a function of it; None where it is a function of the
-    joint, and only follows. breaks (P - 1,), origins (P,), rows (P, degree + 1): the function.
+    joint, and only follows. turns: whether a coordinate that can be set is known to be an angle. breaks (P - 1,),
+    origins (P,), rows (P, degree + 1): the function.
     """
 
     joint: int
@@ -38,6 +41,7 @@ class CoordinateFunction:
     breaks: Array
     origins: Array
     rows: Array
+    turns: bool = False
 
     @property
     def own(self) -> bool:
@@ -100,16 +104,23 @@ def read_coordinate_functions(model: mujoco.MjModel) -> dict[str, CoordinateFunc
     found: dict[str, CoordinateFunction] = {}
     for label, elements in _tuples(model, COORDINATE):
         kinds = [kind for kind, _, _ in elements]
-        own = bool(elements) and elements[0][2] == 1.0
+        mark = elements[0][2] if elements else 0.0
+        own = mark in (LENGTH, ANGLE)
         wanted = [OBJ.mjOBJ_JOINT, OBJ.mjOBJ_NUMERIC] + [OBJ.mjOBJ_NUMERIC] * own
         if kinds != wanted:
             raise ModelError(
                 f"tuple '{label}' must list a joint and then a numeric"
-                + (" and, as the joint has prm=1, a second one with the range of the coordinate" if own else "")
+                + (
+                    f" and, as the joint has prm={mark:g}, a second one with the range of the coordinate"
+                    if own
+                    else ""
+                )
             )
         extent = _extent(model, elements[2][1]) if own else None
         pieces = read_pieces(model, elements[1][1])
-        found[label.replace(COORDINATE, "")] = CoordinateFunction(elements[0][1], extent, *pieces)
+        found[label.replace(COORDINATE, "")] = CoordinateFunction(
+            elements[0][1], extent, *pieces, mark == ANGLE
+        )
     return found
 
 
@@ -129,21 +140,10 @@ def _tuples(model: mujoco.MjModel, word: str) -> list[tuple[str, list[tuple[mujo
     for index in range(model.ntuple):
         label = name_of(model, OBJ.mjOBJ_TUPLE, index)
         if word in label:
-            first = int(model.tuple_adr[index])
-            places = range(first, first + int(model.tuple_size[index]))
-            found.append(
-                (
-                    label,
-                    [
-                        (
-                            OBJ(int(model.tuple_objtype[j])),
-                            int(model.tuple_objid[j]),
-                            float(model.tuple_objprm[j]),
-                        )
-                        for j in places
-                    ],
-                )
-            )
+            first, last = int(model.tuple_adr[index]), int(model.tuple_adr[index] + model.tuple_size[index])
+            kinds = map(OBJ, model.tuple_objtype[first:last].tolist())
+            ids, marks = model.tuple_objid[first:last].tolist(), model.tuple_objprm[first:last].tolist()
+            found.append((label, list(zip(kinds, ids, marks, strict=True))))
     return found
 
 

@@ -151,7 +151,10 @@ def _contradiction(
     shown = joint if joint >= 0 else functions[name].joint
     heads = couplings.heads(shown)
     if heads == [shown] and (joint >= 0 or functions[name].own):
-        return f"equalities of the model tie coordinate '{name}' to others: it is {there:.9g}, and cannot be {value:.9g}"
+        return (
+            f"equalities of the model tie coordinate '{name}' to others: it is {there:.9g}, "
+            f"so it cannot be {value:.9g}"
+        )
     led = " and ".join(f"'{name_of(model, OBJ.mjOBJ_JOINT, head)}'" for head in heads)
     if not heads:
         return f"coordinate '{name}' is locked at {there:.9g} by an equality of the model, and cannot be {value:.9g}"

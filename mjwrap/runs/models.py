@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from mjwrap.errors import ModelError
 from mjwrap.mjcf import has_plugin, name_of, names, read_model, read_spec
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.runs.angles import check_position
+from mjwrap.system.projection import Projection
 from mjwrap.text import nearest
 
 INTEGRATORS = {
@@ -62,13 +65,14 @@ def start_state(
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: Mapping[str, float]) -> None:
     """Reset data to a keyframe (-1: to qpos0), then set hinges and slides to positions [rad, m] by name.
 
-    Joints that follow them, and are not given themselves, are set too. Warns if a position lies outside its joint's
-    range. Raises `ModelError` for a name that is not a hinge or slide, and for positions that only degrees can explain
+    Joints that follow them, or that other equalities tie to them, and are not given themselves, are set too. Warns if a
+    position lies outside its joint's range. Raises `StateError` if no pose with these positions satisfies the
+    equalities, `ModelError` for a name that is not a hinge or slide, and for positions that only degrees can explain
     (`check_position`).
     """
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
-    given = []
+    given, before = [], data.qpos.copy()
     for name, value in positions.items():
         entry = f"{name}={value:g}"
         joint = find_joint(model, name, entry)
@@ -76,6 +80,26 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, key: int, positions: M
         check_position(model, joint, value, f"'{entry}'")
         given.append(joint)
     place_followers(model, data, given)
+    if given:
+        _place_tied(model, data, given, before)
+
+
+def _place_tied(
+    model: mujoco.MjModel, data: mujoco.MjData, joints: list[int], before: NDArray[np.float64]
+) -> None:
+    """Move joints that equalities other than couplings tie to these joints, which stay where the data have them.
+
+    before (nq,): the pose from which all of them come. Raises `StateError` if no pose satisfies the equalities.
+    """
+    projection = Projection(model)
+    if not projection.equalities.active(data):
+        return
+    at = model.jnt_qposadr
+    given = {joint: float(data.qpos[at[joint]]) for joint in joints}
+    data.qpos[:] = before
+    free = {joint: value for joint, value in given.items() if joint not in projection.couplings.leader}
+    data.qpos[:] = projection.place(data, free)
+    data.qpos[at[list(given)]] = list(given.values())
 
 
 def place_followers(model: mujoco.MjModel, data: mujoco.MjData, joints: Collection[int]) -> None:

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from mjwrap.errors import TableError
 from mjwrap.files import Table
 from mjwrap.mjcf import act_names, dof_names, name_of, qpos_names
+from mjwrap.mjcf.coordinate_functions import read_coordinate_functions
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.runs.angles import check_column, unit_taken
 from mjwrap.runs.excitation import control_names
 from mjwrap.runs.models import single_joints
 from mjwrap.runs.run_table import MUSCLE_KINDS
+from mjwrap.runs.tied_columns import place_tied
 from mjwrap.system import MuscleSystem
 from mjwrap.text import counted
 
@@ -125,6 +127,7 @@ class _Reader:
         self.unused: list[str] = []
         self._turned: dict[str, int] = {}  # joints by the columns of their positions
         self._muscles = set(muscles.names)
+        self._functions = read_coordinate_functions(model)
         self._joints = single_joints(model)
         self._hinges = {n for n, j in self._joints.items() if int(model.jnt_type[j]) == _HINGE}
         # by muscle: the array and the index in it
@@ -163,7 +166,22 @@ class _Reader:
                 self._turned[column] = joint
             self.found[kind].add(place)
             return
-        self.unused.append(column)
+        if not self._take_function(column):
+            self.unused.append(column)
+
+    def _take_function(self, column: str) -> bool:
+        """Take a coordinate of which a joint is a function; return whether the column is one."""
+        name = column.removesuffix("/value").rpartition("/")[2]
+        function = self._functions.get(name)
+        if function is None or not function.own:
+            return False
+        values = self.table[column]
+        if function.turns and self.table.in_degrees:
+            values = np.radians(values)
+        place = int(self.model.jnt_qposadr[function.joint])
+        self.arrays["qpos"][:, place] = [function.position(float(value)) for value in values]
+        self.found["qpos"].add(place)
+        return True
 
     def _readings(self, column: str) -> Iterator[tuple[str, int, bool]]:
         """Yield the possible places of a column, best first: array, index in it, whether it is a rotation."""
@@ -195,6 +213,15 @@ class _Reader:
         unit = unit_taken(model, self.table, self._turned)
         remarks = [unit] if unit else []
         placed = self._place_followers()
+        tied = place_tied(model, self.start, self.table, arrays["qpos"], self.found["qpos"])
+        if tied:
+            dofs = [
+                d for d in (int(model.joint(name).dofadr[0]) for name in tied) if d not in self.found["qvel"]
+            ]
+            arrays["qvel"][:, dofs] = _differences(model, time, arrays["qpos"])[:, dofs]
+            remarks.append(
+                f"{counted(len(tied), 'position')} missing, of joints that equalities tie to others: {_few(tied)}"
+            )
         if placed:
             remarks.append(
                 f"{counted(len(placed), 'position')} missing, of joints that follow others: {_few(placed)}"
@@ -202,7 +229,7 @@ class _Reader:
         left = [
             name
             for i, name in enumerate(self.names["qpos"])
-            if i not in self.found["qpos"] and name not in placed
+            if i not in self.found["qpos"] and name not in placed and name not in tied
         ]
         if left:
             remarks.append(f"{counted(len(left), 'position')} missing, taken from the start: {_few(left)}")

@@ -65,7 +65,9 @@ class Equalities:
         mujoco.mj_makeConstraint(model, own)
         kept = np.flatnonzero(own.efc_type == _EQUALITY)
         kept = kept[np.isin(own.efc_id[kept], np.setdiff1d(self._others, list(without)))]
-        return Errors(own.efc_pos[kept].copy(), _jacobian(model, own)[kept], own.efc_id[kept].astype(np.int64))
+        return Errors(
+            own.efc_pos[kept].copy(), _jacobian(model, own)[kept], own.efc_id[kept].astype(np.int64)
+        )
 
     def worst(self, found: Errors) -> str:
         """Return in words which equality has the largest error, and how large it is."""

@@ -31,8 +31,8 @@ def least_motion(rows: Array, wanted: Array, rates: Array) -> Array:
 class CoordinateRates:
     """The rates of a model's coordinates as linear functions of qvel.
 
-    Every degree of freedom is a coordinate, except those of joints that are axes only, and of joints that follow several
-    others; the coordinates that tuples declare as functions are added.
+    Every degree of freedom is a coordinate, except those of joints that are axes only, and of joints that follow
+    several others; the coordinates that tuples declare as functions are added.
     """
 
     def __init__(self, model: mujoco.MjModel, couplings: CoupledJoints) -> None:

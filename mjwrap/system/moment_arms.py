@@ -37,10 +37,10 @@ class _Target(NamedTuple):
 class CoordinateMotions:
     """The motions q̇ (nv,) of a model as a coordinate has the rate 1 and its equalities hold.
 
-    Joints that follow by couplings move along. Where other equalities tie coordinates, the motion is the one whose rates
-    of all coordinates have the least sum of squares: P eᵢ / Pᵢᵢ, with the projector P on the motions that satisfy the
-    equalities, as in OpenSim's moment arms. A joint that an equality holds at a position moves as if that one did not
-    exist.
+    Joints that follow by couplings move along. Where other equalities tie coordinates, the motion is the one whose
+    rates of all coordinates have the least sum of squares: P eᵢ / Pᵢᵢ, with the projector P on the motions that satisfy
+    the equalities, as in OpenSim's moment arms. A joint that an equality holds at a position moves as if that one did
+    not exist.
     """
 
     def __init__(self, model: mujoco.MjModel, couplings: CoupledJoints) -> None:
@@ -48,7 +48,9 @@ class CoordinateMotions:
         self.couplings = couplings
         self._equalities = Equalities(model, couplings)
         self._rates = CoordinateRates(model, couplings)
-        self._freed: dict[int, CoordinateMotions] = {}  # without the coupling of a joint that is held, by joint
+        self._freed: dict[
+            int, CoordinateMotions
+        ] = {}  # without the coupling of a joint that is held, by joint
 
     @property
     def independent(self) -> list[str]:

@@ -146,7 +146,7 @@ class MuscleSystem(Evaluator):
         with J = ∂l/∂q of `length_jacobian`, which is called first. Joints that follow the coordinate by an equality of
         the model move with it. Where other active equalities (loops, points, welds, distances) tie coordinates, N is
         OpenSim's: of all motions that satisfy them, the one with the least sum of squares of the rates of all
-        coordinates, N = P eᵢ / Pᵢᵢ with the projector P on those motions. So it is for a coordinate that follows others,
+        coordinates, N = P eᵢ / Pᵢᵢ with the projector P on those motions. So it is for one that follows others,
         too; a locked one moves as if its lock were open and those of others closed. Couplings of joints are those that
         are active at the model's start, in the pieces that hold at qpos, and other equalities those that are active in
         `data`; qpos should satisfy them (`mw.osim.set_coordinates`). Writes nothing to `data`. Positive, as in OpenSim,

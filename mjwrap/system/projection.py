@@ -32,13 +32,13 @@ class Projection:
         self.equalities = Equalities(model, self.couplings)
         self._rates = CoordinateRates(model, self.couplings)
 
-    def place(self, data: mujoco.MjData, given: Mapping[int, float]) -> Array:
+    def place(self, data: mujoco.MjData, given: Mapping[int, float], nearly: float = NEARLY) -> Array:
         """Return the pose (nq,) after joints have been moved to given positions [rad or m] from that of the data.
 
         given: positions by joint id, of hinges and slides that follow no other. Joints that follow are set by their
         couplings; others that equalities tie move as little as possible, step by step, in the sum of squares of all
-        coordinates. Positions that the equalities tie to each other may differ from given ones as far as `NEARLY`
-        lets them. Nothing is written to the data. Raises `StateError` if the equalities cannot be satisfied.
+        coordinates. Where given positions that equalities tie to each other leave errors up to `nearly` [m or rad],
+        they are moved, too. Nothing is written to the data. Raises `StateError` if the equalities cannot be satisfied.
         """
         model = self.model
         at = model.jnt_qposadr[list(given)]
@@ -49,7 +49,7 @@ class Projection:
         dofs = model.jnt_dofadr[list(given)]
         count = 1
         if self.equalities.active(data):
-            tied = self._tied(data, qpos)[dofs]
+            tied = self.tied(data, qpos)[dofs]
             qpos[at[~tied]] = wanted[~tied]
             count = max(1, int(np.ceil(np.abs(wanted - start)[tied].max(initial=0.0) / STRIDE)))
         for k in range(1, count):
@@ -60,7 +60,7 @@ class Projection:
         found = self.equalities.at(data, qpos)
         if found.largest > ROUNDED:
             qpos, found = self._settled(data, qpos, dofs, hold=True)
-        if HELD < found.largest <= NEARLY:
+        if HELD < found.largest <= nearly:
             qpos, found = self._settled(data, qpos, dofs, hold=False)
         if found.largest > HELD:
             raise StateError(
@@ -69,7 +69,7 @@ class Projection:
             )
         return qpos
 
-    def _tied(self, data: mujoco.MjData, qpos: Array) -> NDArray[np.bool_]:
+    def tied(self, data: mujoco.MjData, qpos: Array) -> NDArray[np.bool_]:
         """Return which degrees of freedom (nv,) equalities tie, with those that follow them."""
         rows = self.equalities.at(data, qpos).jacobian
         tied = np.zeros(self.model.nv, dtype=np.bool_)
@@ -77,7 +77,7 @@ class Projection:
         return tied
 
     def _settled(
-        self, data: mujoco.MjData, qpos: Array, dofs: Array, hold: bool
+        self, data: mujoco.MjData, qpos: Array, dofs: NDArray[np.int32], hold: bool
     ) -> tuple[Array, Errors]:
         """Return the pose near qpos that satisfies the equalities, or the best one found, and their errors.
 

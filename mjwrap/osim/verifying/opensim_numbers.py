@@ -223,9 +223,10 @@ class _Computer:
         return found
 
     def _mass(self) -> tuple[list[list[float]] | None, list[list[float]] | None]:
-        """Return NᵀMN about the rates of the independent coordinates, and each coordinate's speed u from all rates if they differ.
+        """Return NᵀMN about the rates of the independent coordinates, and each one's speed u from all rates.
 
-        Column i of N is P eᵢ / Pᵢᵢ, with the projector P on the rates that satisfy Simbody's constraints.
+        The latter is None where speeds and rates are the same. Column i of N is P eᵢ / Pᵢᵢ, with the projector P on the
+        rates that satisfy Simbody's constraints.
         """
         model, state, opensim = self.model, self.state, self.opensim
         matter = model.getMatterSubsystem()

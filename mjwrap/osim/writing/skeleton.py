@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mjwrap.mjcf.coordinate_functions import ANGLE, LENGTH
 from mjwrap.mjcf.tuple_names import AXES, COORDINATE
 from mjwrap.osim.description.bodies import Coordinate
 from mjwrap.osim.description.functions import Array, Piecewise, linear
@@ -186,12 +187,15 @@ class _Writer:
         function = substitute.motion.function
         data = flattened(function)
         if len(data) <= MOST_NUMBERS:
-            self.tuple(name, substitute.joint, 1, {"function": data, "range": substitute.extent})
+            mark = ANGLE if self.drivers.coordinates[name].motion == "rotational" else LENGTH
+            self.tuple(name, substitute.joint, mark, {"function": data, "range": substitute.extent})
         count = len(function.origins)
         self.report.add("Coordinate", name, EXACT, f"joint '{substitute.joint}' is a function of it, in {count} "
                         f"piece{'s' * (count > 1)}; what follows it follows the joint")  # fmt: skip
 
-    def tuple(self, name: str, joint: str, mark: int | None, numerics: Mapping[str, Iterable[float]]) -> None:
+    def tuple(
+        self, name: str, joint: str, mark: float | None, numerics: Mapping[str, Iterable[float]]
+    ) -> None:
         """Write the tuple of a coordinate: a joint with a mark, and numerics by the ends of their names."""
         record = self.document.add("custom", "tuple", name=f"{COORDINATE}{name}")
         self.document.add(record, "element", objtype="joint", objname=joint, prm=mark)
