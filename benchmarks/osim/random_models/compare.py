@@ -30,7 +30,12 @@ LOOSER = {"length of paths without contact": 1e-9, "reduced mass matrix, share o
 
 def traits(seed: int) -> dict[str, bool]:
     """Return what the model of a seed has."""
-    return {"closed": seed % 10 == 9, "curved": seed % 10 == 8, "surfaces": seed % 10 == 7, "odd_names": seed % 3 == 2}
+    return {
+        "closed": seed % 10 == 9,
+        "curved": seed % 10 == 8,
+        "surfaces": seed % 10 == 7,
+        "odd_names": seed % 3 == 2,
+    }
 
 
 def compared(seed: int, poses: int, folder: str) -> dict[str, Any]:
@@ -46,7 +51,9 @@ def compared(seed: int, poses: int, folder: str) -> dict[str, Any]:
     found: dict[str, Any] = {"seed": seed}
     try:
         imported = mw.import_osim(path)
-        found["left out"] = [f"{e.kind}: {e.text}" for e in imported.report.entries if e.outcome == "left out"]
+        found["left out"] = [
+            f"{e.kind}: {e.text}" for e in imported.report.entries if e.outcome == "left out"
+        ]
     except mw.OsimError as error:
         found["mjwrap"] = str(error)
     except Exception as error:  # whatever it is, it is a finding
@@ -68,7 +75,9 @@ def compared(seed: int, poses: int, folder: str) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--first", type=int, default=0, metavar="SEED")
     parser.add_argument("--count", type=int, default=300, metavar="N")
     parser.add_argument("--poses", type=int, default=4, metavar="N")
@@ -111,7 +120,9 @@ def tell(results: list[dict[str, Any]]) -> None:
         (_, largest, tight, worst), seed = max(rows, key=lambda row: row[0][1])
         tight = LOOSER.get(what, tight)
         beyond = [seed for row, seed in rows if not row[1] <= tight]
-        print(f"{what}: {sum(row[0] for row, _ in rows)} compared, largest {largest:.2e} ({worst}, seed {seed})")
+        print(
+            f"{what}: {sum(row[0] for row, _ in rows)} compared, largest {largest:.2e} ({worst}, seed {seed})"
+        )
         if beyond and not what.startswith(NOT_JUDGED):
             print(f"  not within {tight:g}: {len(beyond)} models: {' '.join(map(str, beyond))}")
     for title in ("left out", "missing"):

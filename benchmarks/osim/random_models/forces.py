@@ -33,7 +33,11 @@ def path(rng: np.random.Generator, made: Skeleton, wraps: list[str]) -> str:
     for k in range(count):
         frame = str(rng.choice(made.frames))
         inner = 0 < k < count - 1
-        kind = str(rng.choice(("PathPoint", "PathPoint", "ConditionalPathPoint", "MovingPathPoint"))) if inner else "PathPoint"
+        kind = (
+            str(rng.choice(("PathPoint", "PathPoint", "ConditionalPathPoint", "MovingPathPoint")))
+            if inner
+            else "PathPoint"
+        )
         named: dict[str, object] = {"socket_parent_frame": frame, "location": rng.normal(0.0, 0.12, 3)}
         inside = ""
         if kind != "PathPoint" and not made.coordinates:
@@ -67,11 +71,14 @@ def muscle(rng: np.random.Generator, name: str, along: str) -> str:
     }  # fmt: skip
     inside = ""
     if kind == "Thelen2003Muscle":
-        numbers |= {"FmaxTendonStrain": rng.uniform(0.03, 0.06), "KshapeActive": rng.uniform(0.3, 0.6), "Flen": 1.6}
+        numbers |= {"FmaxTendonStrain": rng.uniform(0.03, 0.06), "KshapeActive": rng.uniform(0.3, 0.6), "Flen": 1.6,
+                    "ignore_tendon_compliance": False}  # fmt: skip
     elif kind == "Millard2012EquilibriumMuscle":
         numbers |= {"minimum_activation": 0.01, "fiber_damping": 0.1, "ignore_tendon_compliance": False}
-        inside = element("TendonForceLengthCurve", name=f"{name}_tendon", strain_at_one_norm_force=rng.uniform(0.03, 0.08))
-    elif kind == "DeGrooteFregly2016Muscle" or kind == "Thelen2003Muscle" or kind.endswith("Deprecated"):
+        inside = element(
+            "TendonForceLengthCurve", name=f"{name}_tendon", strain_at_one_norm_force=rng.uniform(0.03, 0.08)
+        )
+    elif kind == "DeGrooteFregly2016Muscle" or kind.endswith("Deprecated"):
         numbers["ignore_tendon_compliance"] = False
     return element(kind, along, inside, name=name, **numbers)
 
@@ -94,7 +101,11 @@ def other_forces(rng: np.random.Generator, made: Skeleton) -> list[str]:
         first, second = rng.choice(made.frames, 2, replace=False)
         numbers = {f"{motion}_{what}": rng.uniform(1.0, 100.0, 3) for motion in ("rotational", "translational")
                    for what in ("stiffness", "damping")}  # fmt: skip
-        found.append(element("BushingForce", name="bushing", socket_frame1=str(first), socket_frame2=str(second), **numbers))
+        found.append(
+            element(
+                "BushingForce", name="bushing", socket_frame1=str(first), socket_frame2=str(second), **numbers
+            )
+        )
     return found
 
 
@@ -107,7 +118,9 @@ def contact(rng: np.random.Generator, made: Skeleton) -> tuple[str, str]:
     ]  # fmt: skip
     parameters = element("HuntCrossleyForce::ContactParameters", geometry="ball floor", stiffness=1e6, dissipation=1.0,
                          static_friction=0.8, dynamic_friction=0.4, viscous_friction=0.1)  # fmt: skip
-    force = element("HuntCrossleyForce", listed("HuntCrossleyForce::ContactParametersSet", [parameters]), name="contact")
+    force = element(
+        "HuntCrossleyForce", listed("HuntCrossleyForce::ContactParametersSet", [parameters]), name="contact"
+    )
     return listed("ContactGeometrySet", shapes), force
 
 
@@ -120,7 +133,11 @@ def forces(rng: np.random.Generator, made: Skeleton, wraps: list[str]) -> list[s
         if kind < 3:
             found.append(muscle(rng, f"m{k}", along))
         elif kind == 3:
-            found.append(element("Ligament", along, name=f"lig{k}", resting_length=rng.uniform(0.1, 0.4), pcsa_force=100.0))
+            found.append(
+                element(
+                    "Ligament", along, name=f"lig{k}", resting_length=rng.uniform(0.1, 0.4), pcsa_force=100.0
+                )
+            )
         elif kind == 4:
             found.append(element("PathSpring", along, name=f"s{k}", resting_length=rng.uniform(0.1, 0.4), stiffness=100.0,
                                  dissipation=0.01))  # fmt: skip

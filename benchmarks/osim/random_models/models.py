@@ -18,7 +18,9 @@ MESHES = "".join(
 )
 
 
-def random_model(seed: int, *, closed: bool = False, odd_names: bool = False, curved: bool = False, surfaces: bool = False) -> str:
+def random_model(
+    seed: int, *, closed: bool = False, odd_names: bool = False, curved: bool = False, surfaces: bool = False
+) -> str:
     """Return a random model.
 
     closed: with a constraint between two bodies. odd_names: names that are not ASCII, or that MuJoCo or XML know.

@@ -56,9 +56,15 @@ class Maker:
         moments = np.array([1.0, rng.uniform(0.6, 1.4), 1.0]) * mass * 0.01
         more = inside
         made.body_set.append(
-            element("Body", f"<components>{''.join(frames)}</components>" if frames else "", more, name=name, mass=mass,
-                    mass_center=rng.normal(0.0, 0.05, 3) * (mass > 0.0),
-                    inertia=[*moments, *(0.05 * moments.min() * rng.normal(size=3) * (mass > 0.0))])  # fmt: skip
+            element(
+                "Body",
+                f"<components>{''.join(frames)}</components>" if frames else "",
+                more,
+                name=name,
+                mass=mass,
+                mass_center=rng.normal(0.0, 0.05, 3) * (mass > 0.0),
+                inertia=[*moments, *(0.05 * moments.min() * rng.normal(size=3) * (mass > 0.0))],
+            )  # fmt: skip
         )
         return name
 
@@ -150,12 +156,20 @@ class Maker:
         for k in range(1, len(names)):
             if rng.random() < 0.12:
                 leader = names[rng.integers(0, k)]
-                kind = str(rng.choice(("LinearFunction", "SimmSpline", "PolynomialFunction", "PiecewiseLinearFunction")))
+                kind = str(
+                    rng.choice(
+                        ("LinearFunction", "SimmSpline", "PolynomialFunction", "PiecewiseLinearFunction")
+                    )
+                )
                 made.constraint_set.append(
-                    element("CoordinateCouplerConstraint",
-                            f"<coupled_coordinates_function>{function(rng, kind)}</coupled_coordinates_function>",
-                            name=f"c{k}", independent_coordinate_names=leader, dependent_coordinate_name=names[k],
-                            scale_factor=rng.uniform(0.3, 1.0))  # fmt: skip
+                    element(
+                        "CoordinateCouplerConstraint",
+                        f"<coupled_coordinates_function>{function(rng, kind)}</coupled_coordinates_function>",
+                        name=f"c{k}",
+                        independent_coordinate_names=leader,
+                        dependent_coordinate_name=names[k],
+                        scale_factor=rng.uniform(0.3, 1.0),
+                    )  # fmt: skip
                 )
 
     def constraint(self) -> None:

@@ -14,6 +14,7 @@ from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.muscles.bench import simulate_muscle
 from mjwrap.osim.coordinates import coordinates, set_coordinates
 from mjwrap.osim.verifying.reference import MotionNumbers, PoseNumbers
+from mjwrap.osim.writing.unique_names import body_name
 from mjwrap.system import MuscleSystem
 
 Array = NDArray[np.float64]
@@ -61,9 +62,9 @@ class ImportedModel:
         muscles.reset(data)
         muscles.forward(data)
         bodies = {
-            name: np.concatenate([data.body(name).xpos, data.body(name).xmat.ravel()])
+            name: np.concatenate([data.body(written).xpos, data.body(written).xmat.ravel()])
             for name in pose.bodies
-            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
+            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, written := body_name(name)) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
@@ -99,7 +100,7 @@ class ImportedModel:
         """Return NᵀMN about the rates of the independent coordinates, N from MuJoCo's equalities; None where these
         leave other motions free, or a coordinate is no joint."""
         model, data = self.model, self.data
-        if model.nv == 0 or any(name not in self._joints for name in independent):
+        if model.nv == 0 or not independent or any(name not in self._joints for name in independent):
             return None
         chosen = [int(model.jnt_dofadr[self._joints[name]]) for name in independent]
         follow = np.setdiff1d(np.arange(model.nv), chosen)
