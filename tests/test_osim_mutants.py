@@ -1,4 +1,4 @@
-"""Damaged .osim files through the whole importer: a named error, or a model that loads and whose muscles have forces."""
+"""Damaged .osim files through the importer: a named error, or a model that loads and whose muscles have forces."""
 
 import warnings
 from pathlib import Path

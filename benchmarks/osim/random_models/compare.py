@@ -3,13 +3,14 @@
 
     python benchmarks/osim/random_models/compare.py [--first 0] [--count 300] [--poses 4] [--keep FOLDER]
 
-Needs the package opensim. A third of the models has odd names, a tenth a closing constraint
-(seed % 10 == 9), a tenth coordinates that drive splines only (8), and a tenth joints on ellipsoids (7). For every quantity it
-prints how many comparisons there were, the largest difference, the seeds of the models beyond a tolerance, and the
-models that only one of the two programs reads. Not judged: paths with contact, as OpenSim's are approximate; moment
-arms, which OpenSim takes about angular velocities in ball joints, and without segments between moving points; and
-tensions, as half the muscle classes are approximated, which the report of an import says. Lengths and mass matrices
-may be off by what functions of degrees above 4, and bodies without mass, are approximated by. A process of its own takes each model, as OpenSim may end its process.
+Needs the package opensim. A third of the models has odd names, a tenth a closing constraint (seed % 10 == 9), a tenth
+coordinates that drive splines only (8), a tenth joints on ellipsoids (7): of these three, poses set by name need not
+be OpenSim's. For every quantity it prints how many comparisons there were, the largest difference, the seeds of the
+models beyond a tolerance, and the models that only one of the two programs reads. Not judged: paths with contact, as
+OpenSim's are approximate; moment arms, which OpenSim takes about angular velocities in ball joints, without segments
+between moving points; and tensions, as half of the muscle classes are approximated, which the report of an import says.
+Lengths and mass matrices may be off by what functions of degrees above 4, and bodies without mass, are approximated by.
+A process of its own takes the models, as OpenSim may end its process.
 """
 
 from __future__ import annotations

@@ -57,8 +57,15 @@ def random_model(
     markers = [marker(rng, f"marker{k}", str(rng.choice(made.frames))) for k in range(3)]
     ground_wraps = listed("WrapObjectSet", [wrap_object(rng, "on_ground")] * (rng.random() < 0.2))
     model = element(
-        "Model", element("Ground", ground_wraps, name="ground"), listed("BodySet", made.body_set),
-        listed("JointSet", made.joint_set), listed("ConstraintSet", made.constraint_set), listed("ForceSet", pulls),
-        listed("MarkerSet", markers), geometry, name=f"random_{seed}", gravity=(0.0, -9.80665, 0.0),
-    )  # fmt: skip
+        "Model",
+        element("Ground", ground_wraps, name="ground"),
+        listed("BodySet", made.body_set),
+        listed("JointSet", made.joint_set),
+        listed("ConstraintSet", made.constraint_set),
+        listed("ForceSet", pulls),
+        listed("MarkerSet", markers),
+        geometry,
+        name=f"random_{seed}",
+        gravity=(0.0, -9.80665, 0.0),
+    )
     return f'<?xml version="1.0" encoding="UTF-8"?>\n<OpenSimDocument Version="40600">\n{model}</OpenSimDocument>\n'
