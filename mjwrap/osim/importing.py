@@ -105,11 +105,24 @@ def import_osim(
     validation.require(good, "meshes", "a list of folders", meshes, OsimError)
     validation.whole(poses, 1, "poses", OsimError)
     validation.flag(limits, "limits", OsimError)
+    for folder in meshes:
+        if not Path(folder).is_dir():
+            raise OsimError(f"meshes: '{folder}' is not a folder")
     path = osim_file(path)
+    folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]
+    try:
+        with np.errstate(over="raise", invalid="raise"):
+            return _imported(path, folders, poses, bool(limits))
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise OsimError(
+            f"'{path}': some number is too large or too small to compute with ({error})"
+        ) from None
+
+
+def _imported(path: str | os.PathLike[str], folders: list[Path], poses: int, limits: bool) -> Imported:
     model = read_osim(path)
     document, report = Document(model.name), Report(model.name, model.version)
-    folders = [Path(folder) for folder in meshes] + [Path(path).parent / name for name in MESH_FOLDERS]
-    skeleton = write_mechanics(document, model, report, folders, bool(limits))
+    skeleton = write_mechanics(document, model, report, folders, limits)
     lines = write_paths(document, model, report, skeleton, poses)
     compiled = document.compile()
     data = mujoco.MjData(compiled)

@@ -3,13 +3,14 @@
 
     python benchmarks/osim/random_models/compare.py [--first 0] [--count 300] [--poses 4] [--keep FOLDER]
 
-Needs the package opensim. A third of the models has odd names, a tenth a closing constraint
-(seed % 10 == 9), a tenth coordinates that drive splines only (8), and a tenth joints on ellipsoids (7). For every quantity it
-prints how many comparisons there were, the largest difference, the seeds of the models beyond a tolerance, and the
-models that only one of the two programs reads. Not judged: paths with contact, as OpenSim's are approximate; moment
-arms, which OpenSim takes about angular velocities in ball joints, and without segments between moving points; and
-tensions, as half the muscle classes are approximated, which the report of an import says. Lengths and mass matrices
-may be off by what functions of degrees above 4, and bodies without mass, are approximated by. A process of its own takes each model, as OpenSim may end its process.
+Needs the package opensim. A third of the models has odd names, a tenth a closing constraint (seed % 10 == 9), a tenth
+coordinates that drive splines only (8), a tenth joints on ellipsoids (7): of these three, poses set by name need not
+be OpenSim's. For every quantity it prints how many comparisons there were, the largest difference, the seeds of the
+models beyond a tolerance, and the models that only one of the two programs reads. Not judged: paths with contact, as
+OpenSim's are approximate; moment arms, which OpenSim takes about angular velocities in ball joints, without segments
+between moving points; and tensions, as half of the muscle classes are approximated, which the report of an import says.
+Lengths and mass matrices may be off by what functions of degrees above 4, and bodies without mass, are approximated by.
+A process of its own takes the models, as OpenSim may end its process.
 """
 
 from __future__ import annotations
@@ -30,7 +31,12 @@ LOOSER = {"length of paths without contact": 1e-9, "reduced mass matrix, share o
 
 def traits(seed: int) -> dict[str, bool]:
     """Return what the model of a seed has."""
-    return {"closed": seed % 10 == 9, "curved": seed % 10 == 8, "surfaces": seed % 10 == 7, "odd_names": seed % 3 == 2}
+    return {
+        "closed": seed % 10 == 9,
+        "curved": seed % 10 == 8,
+        "surfaces": seed % 10 == 7,
+        "odd_names": seed % 3 == 2,
+    }
 
 
 def compared(seed: int, poses: int, folder: str) -> dict[str, Any]:
@@ -46,7 +52,9 @@ def compared(seed: int, poses: int, folder: str) -> dict[str, Any]:
     found: dict[str, Any] = {"seed": seed}
     try:
         imported = mw.import_osim(path)
-        found["left out"] = [f"{e.kind}: {e.text}" for e in imported.report.entries if e.outcome == "left out"]
+        found["left out"] = [
+            f"{e.kind}: {e.text}" for e in imported.report.entries if e.outcome == "left out"
+        ]
     except mw.OsimError as error:
         found["mjwrap"] = str(error)
     except Exception as error:  # whatever it is, it is a finding
@@ -68,7 +76,9 @@ def compared(seed: int, poses: int, folder: str) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--first", type=int, default=0, metavar="SEED")
     parser.add_argument("--count", type=int, default=300, metavar="N")
     parser.add_argument("--poses", type=int, default=4, metavar="N")
@@ -111,7 +121,9 @@ def tell(results: list[dict[str, Any]]) -> None:
         (_, largest, tight, worst), seed = max(rows, key=lambda row: row[0][1])
         tight = LOOSER.get(what, tight)
         beyond = [seed for row, seed in rows if not row[1] <= tight]
-        print(f"{what}: {sum(row[0] for row, _ in rows)} compared, largest {largest:.2e} ({worst}, seed {seed})")
+        print(
+            f"{what}: {sum(row[0] for row, _ in rows)} compared, largest {largest:.2e} ({worst}, seed {seed})"
+        )
         if beyond and not what.startswith(NOT_JUDGED):
             print(f"  not within {tight:g}: {len(beyond)} models: {' '.join(map(str, beyond))}")
     for title in ("left out", "missing"):

@@ -7,9 +7,16 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 FUNCTIONS = (
-    "Constant", "LinearFunction", "PolynomialFunction", "SimmSpline", "GCVSpline", "PiecewiseLinearFunction",
-    "MultiplierFunction", "Sine", "StepFunction",
-)  # fmt: skip
+    "Constant",
+    "LinearFunction",
+    "PolynomialFunction",
+    "SimmSpline",
+    "GCVSpline",
+    "PiecewiseLinearFunction",
+    "MultiplierFunction",
+    "Sine",
+    "StepFunction",
+)
 
 
 def element(tag: str, *inside: str, name: str | None = None, **children: object) -> str:
@@ -67,8 +74,13 @@ def function(rng: np.random.Generator, kind: str | None = None, size: float = 0.
             return element(kind, amplitude=values[0], **numbers)
         case "StepFunction":
             start = rng.uniform(-reach, 0.5 * reach)
-            return element(kind, transition_start_time=start, transition_end_time=start + rng.uniform(0.2, 1.0),
-                           start_value=values[0], end_value=values[1])  # fmt: skip
+            return element(
+                kind,
+                transition_start_time=start,
+                transition_end_time=start + rng.uniform(0.2, 1.0),
+                start_value=values[0],
+                end_value=values[1],
+            )
     raise ValueError(kind)
 
 

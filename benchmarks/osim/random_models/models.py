@@ -18,7 +18,9 @@ MESHES = "".join(
 )
 
 
-def random_model(seed: int, *, closed: bool = False, odd_names: bool = False, curved: bool = False, surfaces: bool = False) -> str:
+def random_model(
+    seed: int, *, closed: bool = False, odd_names: bool = False, curved: bool = False, surfaces: bool = False
+) -> str:
     """Return a random model.
 
     closed: with a constraint between two bodies. odd_names: names that are not ASCII, or that MuJoCo or XML know.
@@ -55,8 +57,15 @@ def random_model(seed: int, *, closed: bool = False, odd_names: bool = False, cu
     markers = [marker(rng, f"marker{k}", str(rng.choice(made.frames))) for k in range(3)]
     ground_wraps = listed("WrapObjectSet", [wrap_object(rng, "on_ground")] * (rng.random() < 0.2))
     model = element(
-        "Model", element("Ground", ground_wraps, name="ground"), listed("BodySet", made.body_set),
-        listed("JointSet", made.joint_set), listed("ConstraintSet", made.constraint_set), listed("ForceSet", pulls),
-        listed("MarkerSet", markers), geometry, name=f"random_{seed}", gravity=(0.0, -9.80665, 0.0),
-    )  # fmt: skip
+        "Model",
+        element("Ground", ground_wraps, name="ground"),
+        listed("BodySet", made.body_set),
+        listed("JointSet", made.joint_set),
+        listed("ConstraintSet", made.constraint_set),
+        listed("ForceSet", pulls),
+        listed("MarkerSet", markers),
+        geometry,
+        name=f"random_{seed}",
+        gravity=(0.0, -9.80665, 0.0),
+    )
     return f'<?xml version="1.0" encoding="UTF-8"?>\n<OpenSimDocument Version="40600">\n{model}</OpenSimDocument>\n'

@@ -5,12 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from elements import element, function, listed, offset_frame, place, rising
+from elements import element, function, offset_frame, place, rising
 
 COUNTS = {
-    "WeldJoint": 0, "PinJoint": 1, "SliderJoint": 1, "PlanarJoint": 3, "UniversalJoint": 2, "BallJoint": 3,
-    "GimbalJoint": 3, "FreeJoint": 6, "EllipsoidJoint": 3, "ScapulothoracicJoint": 4,
-}  # fmt: skip
+    "WeldJoint": 0,
+    "PinJoint": 1,
+    "SliderJoint": 1,
+    "PlanarJoint": 3,
+    "UniversalJoint": 2,
+    "BallJoint": 3,
+    "GimbalJoint": 3,
+    "FreeJoint": 6,
+    "EllipsoidJoint": 3,
+    "ScapulothoracicJoint": 4,
+}
 LENGTHS = {"SliderJoint": (0,), "PlanarJoint": (1, 2), "FreeJoint": (3, 4, 5)}  # coordinates that are lengths
 CUSTOM, ON_SURFACES = "CustomJoint", ("EllipsoidJoint", "ScapulothoracicJoint")
 NAMES = ("hip", "knee(1)", "Schulter_ü", "a.b", "ground_", "world", "toe-l", "q", "b'c", "x&y", "膝")
@@ -56,9 +64,15 @@ class Maker:
         moments = np.array([1.0, rng.uniform(0.6, 1.4), 1.0]) * mass * 0.01
         more = inside
         made.body_set.append(
-            element("Body", f"<components>{''.join(frames)}</components>" if frames else "", more, name=name, mass=mass,
-                    mass_center=rng.normal(0.0, 0.05, 3) * (mass > 0.0),
-                    inertia=[*moments, *(0.05 * moments.min() * rng.normal(size=3) * (mass > 0.0))])  # fmt: skip
+            element(
+                "Body",
+                f"<components>{''.join(frames)}</components>" if frames else "",
+                more,
+                name=name,
+                mass=mass,
+                mass_center=rng.normal(0.0, 0.05, 3) * (mass > 0.0),
+                inertia=[*moments, *(0.05 * moments.min() * rng.normal(size=3) * (mass > 0.0))],
+            )
         )
         return name
 
@@ -95,11 +109,21 @@ class Maker:
         elif kind == "EllipsoidJoint":
             numbers = {"radii_x_y_z": rng.uniform(0.05, 0.3, 3)}
         elif kind == "ScapulothoracicJoint":
-            numbers = {"thoracic_ellipsoid_radii_x_y_z": rng.uniform(0.05, 0.3, 3),
-                       "scapula_winging_axis_origin": rng.normal(0.0, 0.05, 2),
-                       "scapula_winging_axis_direction": rng.uniform(-1.0, 1.0)}  # fmt: skip
-        made.joint_set.append(element(kind, *inside, name=name, socket_parent_frame=sockets[0],
-                                      socket_child_frame=sockets[1], **numbers))  # fmt: skip
+            numbers = {
+                "thoracic_ellipsoid_radii_x_y_z": rng.uniform(0.05, 0.3, 3),
+                "scapula_winging_axis_origin": rng.normal(0.0, 0.05, 2),
+                "scapula_winging_axis_direction": rng.uniform(-1.0, 1.0),
+            }
+        made.joint_set.append(
+            element(
+                kind,
+                *inside,
+                name=name,
+                socket_parent_frame=sockets[0],
+                socket_child_frame=sockets[1],
+                **numbers,
+            )
+        )
 
     def coordinate(self, name: str, joint: str, length: bool) -> str:
         rng = self.rng
@@ -113,9 +137,16 @@ class Maker:
         clamped = rng.random() < 0.4
         if clamped:  # OpenSim assembles a coordinate that follows another within its clamp
             self.held.add(name)
-        return element("Coordinate", more * prescribed, name=name, default_value=rng.uniform(low, high),
-                       range=(low, high), clamped=bool(clamped), locked=bool(locked),
-                       prescribed=bool(prescribed))  # fmt: skip
+        return element(
+            "Coordinate",
+            more * prescribed,
+            name=name,
+            default_value=rng.uniform(low, high),
+            range=(low, high),
+            clamped=bool(clamped),
+            locked=bool(locked),
+            prescribed=bool(prescribed),
+        )
 
     def transform(self, coordinates: list[str]) -> str:
         """Return six axes: each coordinate has one of its own, the others are functions of any."""
@@ -150,12 +181,20 @@ class Maker:
         for k in range(1, len(names)):
             if rng.random() < 0.12:
                 leader = names[rng.integers(0, k)]
-                kind = str(rng.choice(("LinearFunction", "SimmSpline", "PolynomialFunction", "PiecewiseLinearFunction")))
+                kind = str(
+                    rng.choice(
+                        ("LinearFunction", "SimmSpline", "PolynomialFunction", "PiecewiseLinearFunction")
+                    )
+                )
                 made.constraint_set.append(
-                    element("CoordinateCouplerConstraint",
-                            f"<coupled_coordinates_function>{function(rng, kind)}</coupled_coordinates_function>",
-                            name=f"c{k}", independent_coordinate_names=leader, dependent_coordinate_name=names[k],
-                            scale_factor=rng.uniform(0.3, 1.0))  # fmt: skip
+                    element(
+                        "CoordinateCouplerConstraint",
+                        f"<coupled_coordinates_function>{function(rng, kind)}</coupled_coordinates_function>",
+                        name=f"c{k}",
+                        independent_coordinate_names=leader,
+                        dependent_coordinate_name=names[k],
+                        scale_factor=rng.uniform(0.3, 1.0),
+                    )
                 )
 
     def constraint(self) -> None:
@@ -165,11 +204,20 @@ class Maker:
         points = rng.normal(0.0, 0.1, (2, 3))
         kind = str(rng.choice(("PointConstraint", "ConstantDistanceConstraint", "PointOnLineConstraint")))
         if kind == "PointOnLineConstraint":
-            parts = {"socket_line_body": first, "socket_follower_body": second, "line_direction_vec": rng.normal(size=3),
-                     "point_on_line": points[0], "point_on_follower": points[1]}  # fmt: skip
+            parts = {
+                "socket_line_body": first,
+                "socket_follower_body": second,
+                "line_direction_vec": rng.normal(size=3),
+                "point_on_line": points[0],
+                "point_on_follower": points[1],
+            }
         else:
-            parts = {"socket_body_1": first, "socket_body_2": second, "location_body_1": points[0],
-                     "location_body_2": points[1]}  # fmt: skip
+            parts = {
+                "socket_body_1": first,
+                "socket_body_2": second,
+                "location_body_1": points[0],
+                "location_body_2": points[1],
+            }
         if kind == "ConstantDistanceConstraint":
             parts["constant_distance"] = rng.uniform(0.2, 0.6)
         made.constraint_set.append(element(kind, name="closing", **parts))

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import mujoco
+
 from mjwrap import import_osim
 from mjwrap.cli.common.errors import FAULTS, UserError
 from mjwrap.cli.common.output import Report, check_unread, open_output

@@ -12,6 +12,7 @@ from mjwrap.osim.reading.nodes import Document, Node
 
 DEEPEST = 60  # elements inside one another; models have about 15
 OLDEST = 20000  # the document version of OpenSim 2.0
+PACKED = (b"\x1f\x8b", b"PK", b"BZ")  # first bytes of gzip, zip and bzip2
 _AMPERSAND = re.compile(r"&(?!(amp|lt|gt|quot|apos|#\d+|#x[0-9a-fA-F]+);)")
 
 
@@ -21,6 +22,10 @@ def read_document(path: Path) -> Node:
         data = path.read_bytes()
     except OSError as problem:
         raise OsimError(f"{path}: cannot be read: {problem.strerror or problem}") from None
+    if not data.strip():
+        raise OsimError(f"{path}: is empty")
+    if data[:2] in PACKED:
+        raise OsimError(f"{path}: is compressed; unpack it first")
     document = Document(str(path))
     root = parse(_decoded(data), document)
     if root.tag != "OpenSimDocument":

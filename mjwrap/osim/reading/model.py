@@ -33,6 +33,9 @@ def read_osim(path: str | os.PathLike[str]) -> OsimModel:
         raise OsimError(
             f"{root.document.file}: has no <Model>; it may hold a part of a model, or another document"
         )
+    more = [node for node in root if node.tag == "Model"][1:]
+    if more:
+        raise more[0].error(f"is a second model; the file must have one, and '{model.name}' is the first")
     return _Reader(model).read()
 
 

@@ -20,6 +20,7 @@ DIMENSIONS: dict[str, tuple[tuple[str, int, float], ...]] = {
     "WrapSphere": (("radius", 1, 0.05),),
     "WrapTorus": (("inner_radius", 1, 0.01), ("outer_radius", 1, 0.05)),
 }
+SMALLEST, LARGEST = 1e-9, 1e9  # [m] dimensions of wrap objects; some files have cylinders of kilometres
 CoordinateName = Callable[[Node, str], str]
 
 
@@ -55,6 +56,8 @@ def read_wrap(node: Node, places: Places, name: str) -> WrapObject:
         dimensions += node.vector(tag, size=size, default=(default,) * size).tolist()
     if not all(dimension > 0.0 for dimension in dimensions):
         raise node.error(f"its dimensions must be positive, not {' '.join(f'{d:g}' for d in dimensions)}")
+    if not all(SMALLEST <= dimension <= LARGEST for dimension in dimensions):
+        raise node.error(f"its dimensions must lie between {SMALLEST:g} and {LARGEST:g} m")
     if node.tag == "WrapTorus" and dimensions[0] >= dimensions[1]:
         node.note("its inner radius is not smaller than its outer one")
     quadrant = node.string("quadrant", default="all").lower() or "all"

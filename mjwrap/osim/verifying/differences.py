@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 RELATIVE = 1e-2  # a difference of a tension, as a share of the larger one, that needs a reason
 TURN = 1e-2  # [rad] a rotation that needs a reason
 LOSS = 1e-3  # [J] change of a passive motion's energy that disproves the motion
+SMALLEST = 1e-12  # of the mass matrix's diagonal, as a share of its largest element, to divide by
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,8 @@ def _compare_bodies(
             found.differences.append(Difference("rotation", name, k, 0.0, angle, "rad", why))
     if pose.mass is not None and ours.mass is not None:
         theirs = np.array(pose.mass)
-        scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+        diagonal = np.maximum(np.diag(theirs), SMALLEST * np.diag(theirs).max())  # 0 for a body without mass
+        scale = np.sqrt(np.outer(diagonal, diagonal))
         share = float((np.abs(ours.mass - theirs) / scale).max())
         every["mass"].add(share, f"pose {k}")
         if not share <= RELATIVE:

@@ -16,6 +16,7 @@ from mjwrap.muscles.bench import simulate_muscle
 from mjwrap.osim.coordinates import coordinates, set_coordinates
 from mjwrap.osim.verifying.reference import MotionNumbers, MotionSample, PoseNumbers
 from mjwrap.osim.verifying.stops import TouchingRoute, TouchingRoutes
+from mjwrap.osim.writing.unique_names import body_name
 from mjwrap.system import MuscleSystem
 from mjwrap.system.moment_arms import CoordinateMotions
 
@@ -97,9 +98,9 @@ class ImportedModel:
         muscles.reset(data)
         muscles.forward(data)
         bodies = {
-            name: np.concatenate([data.body(name).xpos, data.body(name).xmat.ravel()])
+            name: np.concatenate([data.body(written).xpos, data.body(written).xmat.ravel()])
             for name in pose.bodies
-            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
+            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, written := body_name(name)) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
         routes = self._routes.now()
@@ -163,7 +164,7 @@ class ImportedModel:
     def _mass(self, independent: list[str]) -> Array | None:
         """Return NᵀMN about the rates of the independent coordinates; None where a coordinate does not move."""
         model, data = self.model, self.data
-        if model.nv == 0 or not all(self.knows(name) for name in independent):
+        if model.nv == 0 or not independent or not all(self.knows(name) for name in independent):
             return None
         try:
             n = self._motions.columns(data, independent)

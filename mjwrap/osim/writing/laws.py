@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from mjwrap.errors import ModelError
 from mjwrap.mjcf.parameters import law_arguments
 from mjwrap.muscles.activation import ActivationDynamics
-from mjwrap.muscles.laws import LAWS
+from mjwrap.muscles.laws import LAWS, parameter_row
 from mjwrap.muscles.millard_curves import CLASSES, PARAMETERS
 from mjwrap.osim.description.forces import Muscle
 
@@ -75,10 +77,16 @@ def refusal(law: WrittenLaw) -> str:
     tendon = law.words.get("tendon_model")
     up, down = law.numbers.get("activation_time_constants", (None, None))
     try:
-        LAWS[law.name](**law_arguments(law.numbers), **({} if tendon is None else {"tendon": tendon}))
+        with np.errstate(divide="raise", invalid="raise", over="raise"):
+            found = LAWS[law.name](
+                **law_arguments(law.numbers), **({} if tendon is None else {"tendon": tendon})
+            )
+            parameter_row(found)
         ActivationDynamics(law.words.get("activation_dynamics", "zajac"), up, down)
     except ModelError as error:
         return str(error)
+    except FloatingPointError as error:
+        return f"law {law.name}: a curve cannot be computed from the file's numbers ({error})"
     return ""
 
 

@@ -27,7 +27,9 @@ def write_mechanics(
     """
     write_options(document, model)
     for note in model.notes:
-        kind = note.kind if note.outcome == LEFT_OUT else f"note on {note.kind}"  # which has an entry of its own
+        kind = (
+            note.kind if note.outcome == LEFT_OUT else f"note on {note.kind}"
+        )  # which has an entry of its own
         report.add(kind, note.name, note.outcome, note.text)
     for other in model.others:
         report.add(other.kind, other.name, LEFT_OUT, other.text)

@@ -104,9 +104,12 @@ def _closed(model: OsimModel, values: dict[str, float], movable: list[str]) -> d
             ).T
         step: Array = np.linalg.lstsq(slopes, -gap, rcond=1e-8)[0].astype(np.float64)
         step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
+        square = float(step @ step)
+        if not square > 0.0:  # no motion makes it smaller
+            return values
         x = x + step
         before, gap = gap, gap_at(x)
-        slopes += np.outer(gap - before - slopes @ step, step) / float(step @ step)
+        slopes += np.outer(gap - before - slopes @ step, step) / square
     return values
 
 

@@ -83,7 +83,11 @@ def act_between(written: WrittenWrap, first: int, last: int, start: Array, end: 
     hit = depth < 0.0
     nothing = Act(first, last, hit, False, 0.0, along, inside, False)
     side = side_point(wrap) if written.side else None
-    if inside or np.array_equal(start, end) or not (hit or (side is not None and wrap.kind == "WrapCylinder")):
+    if (
+        inside
+        or np.array_equal(start, end)
+        or not (hit or (side is not None and wrap.kind == "WrapCylinder"))
+    ):
         return nothing
     hint = None if side is None else tuple(side)
     solution = solve_path(start, end, [Obstacle(written.surface, hint=hint)])

@@ -25,6 +25,7 @@ from mjwrap.osim.writing.quartics import inverse_pieces
 from mjwrap.osim.writing.rotations import quaternion
 from mjwrap.osim.writing.sites import MOST_NUMBERS
 from mjwrap.osim.writing.tree import Branch, branches_of
+from mjwrap.osim.writing.unique_names import body_name
 
 # The inertia of a body that only shows a coordinate, as a share of the model's mass: the error of a coupling through it
 # grows as it gets smaller, 4e-10 s^2 times force by mass at 1 ms.
@@ -76,7 +77,7 @@ class _Writer:
         element = self.document.add(
             self.document.bodies[branch.parent],
             "body",
-            name=branch.body if branch.body != "world" else "world_",  # MuJoCo's name of ground
+            name=body_name(branch.body),
             pos=home[:3, 3],
             quat=quaternion(home[:3, :3]),
         )

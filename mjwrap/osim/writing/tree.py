@@ -96,8 +96,12 @@ def branches_of(model: OsimModel) -> list[Branch]:
         reached.add(body)
         branches += _branches_across(joint, body, parent, taken, backward=backward)
     for joint in waiting:
-        name = unused(f"{joint.child.body}_{joint.name}", taken)
-        branches += _branches_across(joint, name, joint.parent.body, taken, copy_of=joint.child.body)
+        backward = joint.child.body == GROUND  # of which there is no copy
+        parent, child = joint.parent.body, joint.child.body
+        if backward:
+            parent, child = child, parent
+        name = unused(f"{child}_{joint.name}", taken)
+        branches += _branches_across(joint, name, parent, taken, backward=backward, copy_of=child)
     return branches
 
 

@@ -31,3 +31,8 @@ class UniqueNames:
 def plain_name(name: str) -> str:
     """Return a name as an element of a tuple can refer to it: spaces become underscores."""
     return re.sub(r"\s+", "_", name.strip())
+
+
+def body_name(name: str) -> str:
+    """Return the name of a body as written: MuJoCo calls ground "world"."""
+    return name if name != "world" else "world_"
