@@ -105,8 +105,8 @@ class MuscleSystem(Evaluator):
         state = self._state(data)
         if state.applied is not None and data.time < state.applied:
             raise StateError(
-                f"no step to advance: the time went back from {state.applied:g} s to {data.time:g} s: the data were reset, as MuJoCo does "
-                "when a motion becomes unstable; call reset, then apply, then mj_step, then advance"
+                f"no step to advance: the time went back from {state.applied:g} s to {data.time:g} s: the data were "
+                "reset, as MuJoCo does when a motion becomes unstable; call reset, apply, mj_step, then advance"
             )
         if state.applied is None or not data.time > state.applied:
             raise StateError("no step to advance: call apply, then mj_step, then advance")

@@ -20,7 +20,9 @@ MAX_VELOCITY = 100.0  # [v_max l_o] bound of the fibre velocity, where no force 
 MAX_STEPS = 80  # most Newton steps and bisections for a velocity; three or four are normal
 
 
-_ACTIVE = bezier_shapes.active(*defaults("ActiveForceLengthCurve")[:4], 0.0)  # damped: no minimum force
+_ACTIVE = bezier_shapes.active(
+    *defaults("ActiveForceLengthCurve")[:-1], least=0.0
+)  # damped: no minimum force
 _ACTIVE_PIECES, _ACTIVE_CELLS = bezier.tabulate(_ACTIVE)
 _VELOCITY = bezier_shapes.velocity(*defaults("ForceVelocityCurve"))
 _VELOCITY_PIECES, _VELOCITY_CELLS = bezier.tabulate(_VELOCITY)
