@@ -88,17 +88,16 @@ def generalized_forces(model: mujoco.MjModel, motion: Motion, loads: ExternalLoa
 def joint_forces(model: mujoco.MjModel, motion: CompleteMotion, loads: ExternalLoads | None = None) -> Array:
     """Return the forces (T, nv) about all degrees of freedom that a motion needs without any constraint."""
     frames = LoadFrames(model, loads or ExternalLoads(()), motion.time)
-    evaluate = _whole if _has_more(model) else _rigid_bodies
-    bare = copy.copy(model)
-    bare.opt.disableflags |= _OFF
-    bare.opt.enableflags &= ~_DISCRETE
-    data = mujoco.MjData(bare)
+    evaluate = _rigid_bodies
+    if _has_more(model):
+        evaluate, model = _whole, _without_constraints(model)
+    data = mujoco.MjData(model)
     qpos, qvel, qacc = data.qpos, data.qvel, data.qacc
     found = np.zeros((len(motion), model.nv))
     external = np.zeros(model.nv)
     for k in range(len(motion)):
         qpos[:], qvel[:], qacc[:] = motion.qpos[k], motion.qvel[k], motion.qacc[k]
-        evaluate(bare, data, found[k])
+        evaluate(model, data, found[k])
         if len(loads or ()):
             external[:] = 0.0
             frames.add(data, k, external)
@@ -123,6 +122,14 @@ def _whole(model: mujoco.MjModel, data: mujoco.MjData, out: Array) -> None:
     """Write M q̈ + c − τ_passive as MuJoCo's own inverse dynamics computes it; constraints are disabled."""
     mujoco.mj_inverse(model, data)
     out[:] = data.qfrc_inverse
+
+
+def _without_constraints(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a copy without constraints and contacts, whose inverse dynamics is in continuous time."""
+    bare = copy.copy(model)
+    bare.opt.disableflags |= _OFF
+    bare.opt.enableflags &= ~_DISCRETE
+    return bare
 
 
 def _has_more(model: mujoco.MjModel) -> bool:
