@@ -148,6 +148,10 @@ def test_moment_arms_include_what_follows_the_coordinate(
     arm = mw.read_table(tmp_path / "k_MuscleAnalysis_MomentArm_knee.sto")["quad"]
     slope = np.gradient(length, angles)
     assert arm[1:-1] == pytest.approx(-slope[1:-1], abs=2e-5)
+    out = tmp_path / "run.csv"
+    ran = run_here("replay", capsys, states, "--model", model, "--out", out, "--columns", "moment_arm")
+    assert ran.code == 0, ran.err
+    assert mw.read_table(out)["moment_arm:quad:knee"] == pytest.approx(arm, abs=1e-15)
     given = ["--states", states, "--moment-arms", f"knee={tmp_path / 'k_MuscleAnalysis_MomentArm_knee.sto'}"]
     small = ["--samples", 3, "--bases", 0, "--duration", 0, "--json"]
     told = json.loads(run_here("compare", capsys, model, *given, *small).out)["tables"]

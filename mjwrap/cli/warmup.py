@@ -171,7 +171,7 @@ def muscles() -> None:
 
 
 def evaluate(model: mujoco.MjModel) -> None:
-    """Evaluate, step, differentiate and draw the muscles of a model."""
+    """Evaluate, step, differentiate, analyse and draw the muscles of a model."""
     system, data = CableSystem(model), mujoco.MjData(model)
     system.step(data)
     mujoco.mj_resetData(model, data)
@@ -186,6 +186,7 @@ def evaluate(model: mujoco.MjModel) -> None:
     system.contacts()
     _ = system.hints_met
     system.energetics(mw.Umberger2010())
+    mw.muscle_analysis(system, mw.Motion([0.0], [model.qpos0]))
     if not system.status.any():
         system.length_jacobian_rate(data)
 

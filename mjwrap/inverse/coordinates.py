@@ -12,6 +12,7 @@ from mjwrap.mjcf import dof_names, name_of
 from mjwrap.mjcf.couplings import CoupledJoints
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -31,6 +32,7 @@ class IndependentCoordinates:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         validation.of_type(model, "MjModel", "model", ModelError)
+        self._model = model
         self.couplings = CoupledJoints(model)
         self.dofs = self.couplings.independent
         known = dof_names(model)
@@ -42,6 +44,20 @@ class IndependentCoordinates:
     def matrices(self, qpos: Array) -> Array:
         """Return N = ∂q/∂q_independent (T, nv, k) at poses qpos (T, nq), see `CoupledJoints.matrix`."""
         return np.ascontiguousarray(np.moveaxis(self.couplings.matrix(qpos.T), 1, 0))
+
+    def followers(self) -> tuple[Ints, Ints, Ints]:
+        """Return the other degrees of freedom (f,), and which of the independent ones each follows.
+
+        Number i follows those of the numbers heads[starts[i] : starts[i + 1]] in `dofs`; returned: dofs, starts, heads.
+        """
+        model, places = self._model, {int(dof): i for i, dof in enumerate(self.dofs)}
+        others = np.setdiff1d(np.arange(model.nv), self.dofs)
+        heads = [
+            [places[int(model.jnt_dofadr[head])] for head in self.couplings.heads(int(model.dof_jntid[dof]))]
+            for dof in others
+        ]
+        starts = np.cumsum([0, *(len(each) for each in heads)]).astype(np.int64)
+        return others, starts, np.array([head for each in heads for head in each], dtype=np.int64)
 
 
 def _translates(model: mujoco.MjModel, dof: int) -> bool:

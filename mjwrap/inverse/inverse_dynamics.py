@@ -95,9 +95,7 @@ def joint_forces(
     frames = LoadFrames(model, loads or ExternalLoads(()), motion.time)
     evaluate, bare = _rigid_bodies, model
     if _has_more(model):
-        evaluate, bare = _whole, copy.copy(model)
-        bare.opt.disableflags |= _OFF
-        bare.opt.enableflags &= ~_DISCRETE
+        evaluate, bare = _whole, _without_constraints(model)
     found = np.zeros((len(motion), model.nv))
 
     def run(begin: int) -> None:
@@ -132,6 +130,14 @@ def _whole(model: mujoco.MjModel, data: mujoco.MjData, out: Array) -> None:
     """Write M q̈ + c − τ_passive as MuJoCo's own inverse dynamics computes it; constraints are disabled."""
     mujoco.mj_inverse(model, data)
     out[:] = data.qfrc_inverse
+
+
+def _without_constraints(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a copy without constraints and contacts, whose inverse dynamics is in continuous time."""
+    bare = copy.copy(model)
+    bare.opt.disableflags |= _OFF
+    bare.opt.enableflags &= ~_DISCRETE
+    return bare
 
 
 def _has_more(model: mujoco.MjModel) -> bool:

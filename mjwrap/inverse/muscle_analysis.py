@@ -106,7 +106,7 @@ def muscle_analysis(
     independent = IndependentCoordinates(model)
     frames, n, k = len(whole), plan.n, len(independent.dofs)
     drive = _activations(activation, frames, n)
-    followers = np.setdiff1d(np.arange(model.nv), independent.dofs)
+    followers = independent.followers()
     last = Evaluation(n, plan.node.copy(), len(plan.routes))
     found = MuscleAnalysis(
         whole.time, tuple(muscles.names), independent.names,
@@ -136,7 +136,7 @@ def muscle_analysis(
                 *(some(name) for name in ("site_xpos", "geom_xpos", "geom_xmat", "cvel", "subtree_com")),
                 muscles._root, muscles._last_dof, muscles._dofs[2], some("cdof"), whole.qvel[block],
                 plan.uses, slopes, active, TOLERANCE, *last.paths,
-                drive[block], independent.dofs, followers, independent.matrices(whole.qpos[block]),
+                drive[block], independent.dofs, *followers, independent.matrices(whole.qpos[block]),
             )  # fmt: skip
             results = (
                 last.length, last.velocity, last.status,

@@ -13,10 +13,10 @@ from mjwrap.files import RowWriter
 from mjwrap.files.atomic import PartFile
 from mjwrap.mjcf import dof_names
 from mjwrap.mjcf.couplings import CoupledJoints
-from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.muscles.energetics import Energetics, Umberger2010, basal_power
 from mjwrap.muscles.fibers import FiberState
 from mjwrap.system import MuscleSystem
+from mjwrap.system.moment_arms import arms_of_all_dofs, moved_muscles
 
 Array = NDArray[np.float64]
 
@@ -115,13 +115,8 @@ class MuscleAnalysisTables:
 
     def _moving(self, model: mujoco.MjModel) -> list[int]:
         """Return the degrees of freedom that move a muscle, alone or with those that follow them."""
-        crossed = np.atleast_1d(crossed_dofs(model, self._muscles.declarations).any(axis=0))
-        moving = crossed.copy()
-        leaders = self._couplings.leader
-        for joint in leaders:
-            for head in self._couplings.heads(joint):
-                moving[model.jnt_dofadr[head]] |= crossed[model.jnt_dofadr[joint]]
-        return np.flatnonzero(moving).tolist()
+        moved = moved_muscles(model, self._couplings, self._muscles.declarations)
+        return np.flatnonzero(moved.any(axis=0)).tolist()
 
     def _add(self, prefix: str, quantity: str, names: list[str], read: Read) -> None:
         output = self._open(f"{prefix}_{quantity}.sto")
@@ -132,8 +127,7 @@ class MuscleAnalysisTables:
     def log(self, data: mujoco.MjData) -> None:
         """Write the results at the present state."""
         muscles, couplings = self._muscles, self._couplings
-        arms = -muscles.length_jacobian(data)
-        arms[:, couplings.independent] = arms @ couplings.matrix(data.qpos)
+        arms = arms_of_all_dofs(couplings, muscles.length_jacobian(data), data.qpos)
         energy = muscles.energetics(Umberger2010())
         sample = _Sample(arms, muscles.fiber_state(), energy, muscles.length, muscles.tension)
         for part in self._parts:

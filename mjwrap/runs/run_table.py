@@ -14,9 +14,10 @@ from mjwrap.files import RowWriter, Table
 from mjwrap.files.atomic import PartFile
 from mjwrap.files.writing import save_npz
 from mjwrap.mjcf import act_names, dof_names, qpos_names
-from mjwrap.model.kinematic_tree import crossed_dofs
+from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.runs.excitation import control_names
 from mjwrap.system import MuscleSystem
+from mjwrap.system.moment_arms import arms_of_all_dofs, moved_muscles
 
 Array = NDArray[np.float64]
 MUSCLE_KINDS = ("activation", "fiber_length", "length", "velocity", "tension")
@@ -41,7 +42,7 @@ def check_kinds(kinds: Iterable[str]) -> list[str]:
 
 
 def columns(model: mujoco.MjModel, muscles: MuscleSystem, kinds: Sequence[str]) -> list[Column]:
-    """Return the columns of the given kinds, each called KIND:NAME; SI units; moment arms are −∂l/∂q."""
+    """Return the columns of the given kinds, each called KIND:NAME; SI units. Moment arms have couplings included."""
     found = []
     for kind in kinds:
         if kind == "moment_arm":
@@ -59,11 +60,15 @@ def _reader(owner: MuscleSystem | None, kind: str) -> Callable[[mujoco.MjData], 
 
 
 def _moment_arms(model: mujoco.MjModel, muscles: MuscleSystem) -> Column:
-    """Return the moment arms of every muscle about the joints that it crosses."""
-    dofs = dof_names(model)
-    rows, places = np.nonzero(crossed_dofs(model, muscles.declarations))
+    """Return the moment arms of every muscle about the joints that move it, as `MuscleSystem.moment_arms` does."""
+    dofs, couplings = dof_names(model), CoupledJoints(model)
+    rows, places = np.nonzero(moved_muscles(model, couplings, muscles.declarations))
     names = [f"moment_arm:{muscles.names[i]}:{dofs[d]}" for i, d in zip(rows, places, strict=True)]
-    return Column(names, lambda data: -muscles.length_jacobian(data)[rows, places])
+
+    def read(data: mujoco.MjData) -> Array:
+        return arms_of_all_dofs(couplings, muscles.length_jacobian(data), data.qpos)[rows, places]
+
+    return Column(names, read)
 
 
 class RunTable:

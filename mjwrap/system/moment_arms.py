@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from mjwrap import validation
 from mjwrap.errors import GeometryError
-from mjwrap.mjcf import name_of, names
+from mjwrap.mjcf import MuscleDeclaration, name_of, names
 from mjwrap.mjcf.couplings import CoupledJoints
 from mjwrap.mjcf.names import listed
+from mjwrap.model.kinematic_tree import crossed_dofs
 from mjwrap.text import nearest
 
 Array = NDArray[np.float64]
@@ -42,6 +43,25 @@ def moment_arms(
     dofs = _dofs(model, couplings, _listed(given))
     columns = np.searchsorted(couplings.independent, dofs)
     return -jacobian @ couplings.matrix(qpos)[:, columns]
+
+
+def arms_of_all_dofs(couplings: CoupledJoints, jacobian: Array, qpos: Array) -> Array:
+    """Return moment arms (n, nv) [m]: −J N for independent degrees of freedom, −J for those that follow others."""
+    arms = -jacobian
+    arms[:, couplings.independent] = arms @ couplings.matrix(qpos)
+    return arms
+
+
+def moved_muscles(
+    model: mujoco.MjModel, couplings: CoupledJoints, muscles: Sequence[MuscleDeclaration]
+) -> NDArray[np.bool_]:
+    """Return which degrees of freedom move each muscle (n, nv), alone or with the joints that follow them."""
+    crossed = crossed_dofs(model, muscles)
+    moved = crossed.copy()
+    for joint in couplings.leader:
+        for head in couplings.heads(joint):
+            moved[:, model.jnt_dofadr[head]] |= crossed[:, model.jnt_dofadr[joint]]
+    return moved
 
 
 def _listed(coordinates: Iterable[str]) -> list[str]:

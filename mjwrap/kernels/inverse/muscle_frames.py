@@ -50,13 +50,14 @@ def measure_frames(
     last_dof, parent, cdof, qvel,
     uses, slopes, active,
     tol, node, segments, count, info,
-    activation, dofs, followers, elimination,
+    activation, dofs, followers, starts, heads, elimination,
     row, length, velocity, status,
     all_length, all_velocity, all_arm, all_active, all_passive, all_status,
 ):  # fmt: skip
     """Evaluate the muscles of routes first_route to end_route - 1 at all frames.
 
-    activation (T, n). dofs (k,): the independent ones; followers: the others; elimination (T, nv, k): N = dq/dq_ind.
+    activation (T, n). dofs (k,): the independent ones; followers: the others, of which number f follows the independent
+    ones heads[starts[f] : starts[f + 1]], numbered as in dofs; elimination (T, nv, k): N = dq/dq_ind.
     row (nv,): scratch, zeros before and after. length, velocity, status (n,): of the last frame; a muscle without a
     path keeps them. Results (T, n), and moment arms -(J N) in all_arm (T, n, k).
     """
@@ -92,8 +93,8 @@ def measure_frames(
             for f in range(followers.shape[0]):
                 slope = row[followers[f]]
                 if slope != 0.0:
-                    for i in range(dofs.shape[0]):
-                        all_arm[t, m, i] -= slope * elimination[t, followers[f], i]
+                    for h in range(starts[f], starts[f + 1]):
+                        all_arm[t, m, heads[h]] -= slope * elimination[t, followers[f], heads[h]]
             for i in range(row.shape[0]):
                 row[i] = 0.0
             pull, rest = force_parts(law[m], params, m, activation[t, m], length[m], velocity[m])

@@ -10,7 +10,7 @@ from mjwrap.errors import OsimError
 from mjwrap.osim.description.bodies import Coordinate, Coupler
 from mjwrap.osim.description.functions import Piecewise
 from mjwrap.osim.description.model import OsimModel
-from mjwrap.osim.writing.motions import Motion, scaled
+from mjwrap.osim.writing.motions import AxisMotion, scaled
 from mjwrap.osim.writing.piece_algebra import composed
 from mjwrap.osim.writing.quartics import TOLERANCE, inverse_pieces
 from mjwrap.osim.writing.tree import Branch, unused
@@ -24,7 +24,7 @@ class Substitute:
     """The motion, with the name of its joint, that stands for a coordinate, which is a function of the joint's qpos."""
 
     joint: str
-    motion: Motion
+    motion: AxisMotion
     extent: tuple[float, float]  # of the coordinate, in which the motion rises or falls
     short_inverse: Piecewise  # with so few pieces that a numeric of MuJoCo can hold them
 
@@ -40,7 +40,7 @@ class Drivers:
 
     coordinates: dict[str, Coordinate]
     couplers: dict[str, Coupler]
-    carriers: dict[str, Motion]
+    carriers: dict[str, AxisMotion]
     substitutes: dict[str, Substitute] = field(default_factory=dict)
     values: dict[str, float] = field(default_factory=dict)
 
@@ -99,10 +99,10 @@ def drivers_of(model: OsimModel, branches: list[Branch]) -> Drivers:
             _check(constraint, coordinates)
             couplers.setdefault(constraint.dependent, constraint)
     _refuse_circles(couplers)
-    carriers: dict[str, Motion] = {}
+    carriers: dict[str, AxisMotion] = {}
     for branch in branches:
         for step in branch.chain:
-            if not isinstance(step, Motion):
+            if not isinstance(step, AxisMotion):
                 continue
             if step.coordinate not in coordinates:
                 raise OsimError(
@@ -126,7 +126,7 @@ def _substitutes(
     """Return motions that rise or fall all along with a coordinate that none shows; turns first."""
     found: dict[str, Substitute] = {}
     taken = set(coordinates)
-    steps = [(branch, step) for branch in branches for step in branch.chain if isinstance(step, Motion)]
+    steps = [(branch, step) for branch in branches for step in branch.chain if isinstance(step, AxisMotion)]
     for branch, step in sorted(steps, key=lambda pair: not pair[1].turn):
         name = step.coordinate
         if name in shown or name in found or not step.main:
@@ -161,12 +161,12 @@ def default_of(coordinate: Coordinate) -> float:
     )
 
 
-def _shows(motion: Motion) -> bool:
+def _shows(motion: AxisMotion) -> bool:
     """Whether a motion goes with its coordinate, one to one, in one direction or the other."""
     return motion.main and motion.function.is_linear and abs(float(motion.function(0.0, 1))) == 1.0
 
 
-def _fits(motion: Motion, coordinates: dict[str, Coordinate]) -> bool:
+def _fits(motion: AxisMotion, coordinates: dict[str, Coordinate]) -> bool:
     return motion.turn == (coordinates[motion.coordinate].motion == "rotational")
 
 

@@ -19,8 +19,8 @@ from mjwrap.osim.writing.motions import (
     ROTATION_NAMES,
     TRANSLATION_NAMES,
     Array,
+    AxisMotion,
     Chain,
-    Motion,
     Values,
     moved,
     turned,
@@ -30,7 +30,7 @@ X, Y, Z = np.eye(3)
 
 
 @dataclass(frozen=True)
-class EllipsoidSlide(Motion):
+class EllipsoidSlide(AxisMotion):
     """A slide along x by offset n_x, or along z by offset n_z. `coordinate` is the second coordinate.
 
     first: the name of the first coordinate; offset [m]: a - b or c - b. along_z: whether it slides along z.
@@ -82,8 +82,8 @@ def ellipsoid_of(joint: Joint) -> Ellipsoid:
     return _ellipsoid(quarter, np.array([b, a, c]), names, winging)
 
 
-def _turn(axis: Array, coordinate: str, name: str) -> Motion:
-    return Motion(True, axis, coordinate, linear(1.0), name)
+def _turn(axis: Array, coordinate: str, name: str) -> AxisMotion:
+    return AxisMotion(True, axis, coordinate, linear(1.0), name)
 
 
 def _ellipsoid(before: Array, radii: Array, names: list[str], after: Chain) -> Ellipsoid:

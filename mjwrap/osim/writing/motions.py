@@ -20,7 +20,7 @@ Values = Callable[[str], float]  # the value of a coordinate by its name
 
 
 @dataclass(frozen=True)
-class Motion:
+class AxisMotion:
     """A turn about, or a slide along, a unit axis (3,) by function(coordinate) [rad or m].
 
     name: of the axis in its joint, for a joint of its own. main: whether it is the turn that shows the coordinate.
@@ -41,12 +41,12 @@ class Motion:
         """Return the motion (4, 4) when its function has a value."""
         return turned(self.axis, value) if self.turn else moved(self.axis * value)
 
-    def reversed(self) -> Motion:
+    def reversed(self) -> AxisMotion:
         """Return the inverse motion."""
         return replace(self, axis=-self.axis)
 
 
-Step = Motion | Array  # an array (4, 4) is a fixed transform
+Step = AxisMotion | Array  # an array (4, 4) is a fixed transform
 Chain = list[Step]
 
 
@@ -83,14 +83,14 @@ def inverse(transform: Array) -> Array:
 
 def inverted(chain: Chain) -> Chain:
     """Return the chain of the inverse motion."""
-    return [step.reversed() if isinstance(step, Motion) else inverse(step) for step in reversed(chain)]
+    return [step.reversed() if isinstance(step, AxisMotion) else inverse(step) for step in reversed(chain)]
 
 
 def evaluated(chain: Chain, values: Values) -> Array:
     """Return the transform (4, 4) of a chain at values of the coordinates."""
     out = np.eye(4)
     for step in chain:
-        if isinstance(step, Motion):
+        if isinstance(step, AxisMotion):
             out = out @ step.transform(step.value(values))
         else:
             out = out @ step
@@ -110,7 +110,7 @@ def spatial_chain(joint: Joint) -> Chain:
             scale = 1.0 if turn or abs(length - 1.0) < 1e-15 else length
             function = axis.function if scale == 1.0 else scaled(axis.function, scale)
             coordinate = axis.coordinates[0] if axis.coordinates else ""
-            motion = Motion(turn, direction, coordinate, function, name)
+            motion = AxisMotion(turn, direction, coordinate, function, name)
             if function.is_constant or not coordinate:
                 chain.append(motion.transform(float(function(0.0))))
             else:
@@ -127,7 +127,7 @@ def merged(chain: Chain) -> Chain:
     """Return the same chain with neighbouring fixed transforms multiplied."""
     out: Chain = []
     for step in chain:
-        if out and not isinstance(step, Motion) and not isinstance(out[-1], Motion):
+        if out and not isinstance(step, AxisMotion) and not isinstance(out[-1], AxisMotion):
             out[-1] = out[-1] @ step
         else:
             out.append(step)

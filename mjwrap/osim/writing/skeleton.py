@@ -16,7 +16,7 @@ from mjwrap.osim.writing.document import Document
 from mjwrap.osim.writing.drivers import Drivers, drivers_of
 from mjwrap.osim.writing.ellipsoids import EllipsoidSlide
 from mjwrap.osim.writing.inertias import Written, written_inertias
-from mjwrap.osim.writing.motions import Motion, evaluated
+from mjwrap.osim.writing.motions import AxisMotion, evaluated
 from mjwrap.osim.writing.piece_algebra import composed, flattened
 from mjwrap.osim.writing.quartics import inverse_pieces
 from mjwrap.osim.writing.rotations import quaternion
@@ -35,7 +35,7 @@ class Skeleton:
     branches: list[Branch]
     drivers: Drivers
     inertias: dict[str, Written]
-    joints: list[tuple[str, Motion]]  # the name and the motion of every joint of a body
+    joints: list[tuple[str, AxisMotion]]  # the name and the motion of every joint of a body
 
     def qpos(self, values: dict[str, float]) -> dict[str, float]:
         """Return qpos of every joint of a body at values of all coordinates, exactly, without pieces."""
@@ -56,7 +56,7 @@ class _Writer:
         for name, each in drivers.substitutes.items():
             low, high = sorted(map(float, each.motion.function(drivers.coordinates[name].range)))
             self.ranges[each.joint] = low, high
-        self.joints: list[tuple[str, Motion]] = []
+        self.joints: list[tuple[str, AxisMotion]] = []
 
     def name(self, wanted: str) -> str:
         name = "_".join(wanted.split())
@@ -80,7 +80,7 @@ class _Writer:
         after = np.eye(4)  # the body in the frame that a motion has moved
         joints = []
         for step in reversed(branch.chain):
-            if isinstance(step, Motion):
+            if isinstance(step, AxisMotion):
                 joints.append(self.joint(branch, step, after))
                 after = step.transform(step.value(values)) @ after
             else:
@@ -92,7 +92,7 @@ class _Writer:
             self.document.add(element, "inertial", pos=inertia.properties.center, mass=inertia.properties.mass,
                               quat=quaternion(axes), diaginertia=moments)  # fmt: skip
 
-    def joint(self, branch: Branch, motion: Motion, after: Array) -> dict[str, object]:
+    def joint(self, branch: Branch, motion: AxisMotion, after: Array) -> dict[str, object]:
         """Return the attributes of a motion's joint; remember whether it follows a coordinate."""
         drivers, coordinate = self.drivers, motion.coordinate
         axis = after[:3, :3].T @ motion.axis
@@ -208,12 +208,14 @@ def write_bodies(document: Document, model: OsimModel, report: Report) -> Skelet
         if not (branch.copy_of and branch.fixed):
             writer.body(branch, inertias[branch.body])
     least = CARRIER * (sum(body.mass for body in model.bodies) or 1.0)
-    moving = {step.coordinate for branch in branches for step in branch.chain if isinstance(step, Motion)}
+    moving = {step.coordinate for branch in branches for step in branch.chain if isinstance(step, AxisMotion)}
     needed = moving | {coupler.independent[0] for coupler in drivers.couplers.values()}
     for name, coordinate in drivers.coordinates.items():
         if name not in writer.shown and name not in drivers.couplers and name in needed:
             writer.carrier(coordinate, least)
-            drivers.carriers.setdefault(name, Motion(True, np.array([1.0, 0.0, 0.0]), name, linear(1.0), ""))
+            drivers.carriers.setdefault(
+                name, AxisMotion(True, np.array([1.0, 0.0, 0.0]), name, linear(1.0), "")
+            )
             writer.shown.add(name)
     writer.couplings()
     writer.functions()

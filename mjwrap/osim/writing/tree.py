@@ -13,8 +13,8 @@ from mjwrap.osim.description.model import OsimModel
 from mjwrap.osim.writing.ellipsoids import ellipsoid_of
 from mjwrap.osim.writing.motions import (
     Array,
+    AxisMotion,
     Chain,
-    Motion,
     inverse,
     inverted,
     merged,
@@ -57,7 +57,7 @@ class Branch:
     @property
     def fixed(self) -> bool:
         """Whether the body cannot move in its parent."""
-        return not any(isinstance(step, Motion) for step in self.chain)
+        return not any(isinstance(step, AxisMotion) for step in self.chain)
 
 
 def branches_of(model: OsimModel) -> list[Branch]:
