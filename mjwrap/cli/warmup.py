@@ -28,6 +28,8 @@ from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
 from mjwrap.kernels.compilation import cache_folders, self_test
 from mjwrap.kernels.compilation.cache_folders import config
+from mjwrap.kernels.musculotendon.dispatch import PARAMS
+from mjwrap.kernels.musculotendon.tangent import tangents
 from mjwrap.runs.compile_time import CompileClock
 from mjwrap.runs.models import load
 from mjwrap.system import CableSystem
@@ -164,9 +166,12 @@ def paths() -> None:
 
 
 def muscles() -> None:
-    """Evaluate and step a MuscleSystem, and simulate a single muscle."""
+    """Evaluate and step a MuscleSystem, optimise activations, and simulate a single muscle."""
     for text in (SCENE, SCENE.replace("</custom>", MOVING)):
         evaluate(mujoco.MjModel.from_xml_string(text))
+    model, none = mujoco.MjModel.from_xml_string(SCENE), np.zeros((0, 1))
+    mw.static_optimization(mw.MuscleSystem(model), mw.Motion([0.0], [model.qpos0]), jobs=1)
+    tangents(np.zeros(1, dtype=np.int64), np.zeros((1, PARAMS)), none, none, none, none, none)
     laws()
 
 
