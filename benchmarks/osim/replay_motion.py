@@ -4,7 +4,8 @@
 
 Needs the package opensim. The motion, seeded sines of the independent coordinates, is written as .mot and .sto; OpenSim
 reads each as a Storage and as a TimeSeriesTable, and its MuscleAnalysis runs along it. Printed: largest differences.
---motion takes the motion that `mjwrap run --motion` wrote instead. --frozen keeps OpenSim's lengths and moment arms at the motion for the tests.
+--motion takes the motion that `mjwrap run --motion` wrote instead. --frozen keeps OpenSim's lengths and moment arms at
+the motion for the tests.
 """
 
 import argparse

@@ -27,13 +27,17 @@ def driven_cause(imported: ImportedModel, motion: MotionNumbers, until: float) -
         for sample in motion.samples
         if motion.time[sample.frame] <= until
     ]
-    plain = [ours.missing for _, sample, ours in compared if not _contradicts(sample) and not _apart(sample, ours)]
+    plain = [
+        ours.missing for _, sample, ours in compared if not _contradicts(sample) and not _apart(sample, ours)
+    ]
     missing = _largest(plain)
     if missing > FORCE:
         return ""
     found = [text for text in (_contradiction(compared), _other_paths(compared)) if text]
     if found and np.isfinite(missing):
-        found.append(f"at {len(plain)} states where no muscle differs, forces and accelerations agree within {missing:.1g}")
+        found.append(
+            f"at {len(plain)} states where no muscle differs, forces and accelerations agree within {missing:.1g}"
+        )
     return "; ".join(found)
 
 
@@ -81,7 +85,10 @@ def _other_paths(compared: Compared) -> str:
     changed = [ours for _, sample, ours in compared if _apart(sample, ours) and not _contradicts(sample)]
     own, theirs = _largest(o.missing for o in changed), _largest(o.missing_with_theirs for o in changed)
     if np.isfinite(own):
-        text += f"; forces and accelerations differ by {100 * own:.2g} %, and by {100 * theirs:.2g} % with OpenSim's tensions"
+        text += (
+            f"; forces and accelerations differ by {100 * own:.2g} %, and with OpenSim's tensions by "
+            f"{100 * theirs:.2g} %"
+        )
         if theirs > 0.5 * own:
             return ""
     return text

@@ -95,7 +95,7 @@ class ImportedModel:
             if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
-        routes = self._routes.now()
+        routes = self._routes.now(data)
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
         touched = {name: len(muscles.contact_points(i)) for i, name in enumerate(muscles.names)}
         arms: dict[str, dict[str, float]] = {}
@@ -223,7 +223,9 @@ class ImportedModel:
         """Return the share of the generalised forces about the independent joints that accelerations need and tensions
         along the paths of the last evaluation do not have, for either of two tensions."""
         model, couplings = self.model, CoupledJoints(self.model)
-        chosen = {int(model.jnt_dofadr[self._joints[n]]): accelerations.get(n) for n in self.muscles.coordinates}
+        chosen = {
+            int(model.jnt_dofadr[self._joints[n]]): accelerations.get(n) for n in self.muscles.coordinates
+        }
         found = [chosen.get(int(dof)) for dof in couplings.independent]
         others = data.eq_active.astype(np.bool_) & (model.eq_type != int(mujoco.mjtEq.mjEQ_JOINT))
         if others.any() or any(each is None for each in found):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def length_reason(
     return (
         _short_arc(contacts)
         or _other_segment(pose.segments.get(name, {}), routes)
-        or _beyond_end(contacts, routes)
+        or _beyond_end(contacts, routes, pose.lengths[name])
         or _not_taut(contacts)
         or _jump(pose.slopes.get(name, {}))
         or _confirmed(routes, geodesic)
@@ -65,8 +66,14 @@ def _short_arc(contacts: dict[str, list[float]]) -> str:
 
 def _not_taut(contacts: dict[str, list[float]]) -> str:
     bent = {o: kink for o, (_, _, kink) in contacts.items() if kink > BENT}
-    which = ", ".join(f"{o} at {np.degrees(np.arcsin(min(sine, 1.0))):.1f} degrees" for o, sine in bent.items())
-    return f"OpenSim's path is not taut: its straight line meets {which}, where a string is tangent" if bent else ""
+    which = ", ".join(
+        f"{o} at {np.degrees(np.arcsin(min(sine, 1.0))):.1f} degrees" for o, sine in bent.items()
+    )
+    return (
+        f"OpenSim's path is not taut: its straight line meets {which}, where a string is tangent"
+        if bent
+        else ""
+    )
 
 
 def _jump(slopes: dict[str, list[float]]) -> str:
@@ -94,16 +101,23 @@ def _other_segment(segments: dict[str, list[str]], routes: list[TouchingRoute]) 
     return ""
 
 
-def _beyond_end(contacts: dict[str, list[float]], routes: list[TouchingRoute]) -> str:
-    """Return that a contact lies beyond the end of a cylinder that OpenSim's path does not wrap."""
+def _beyond_end(contacts: dict[str, list[float]], routes: list[TouchingRoute], theirs: float) -> str:
+    """Return that a contact lies beyond the end of a cylinder that OpenSim's path does not wrap, and whether the path
+    without it has OpenSim's length [m]."""
     for route in routes:
         for stop in route.stops:
             if isinstance(stop, Touched) and stop.name not in contacts:
                 beyond = float(np.abs(stop.contact[:, 2]).max()) - stop.half
                 if beyond > BEYOND:
+                    without = closed_form_length(
+                        replace(route, stops=[s for s in route.stops if s is not stop])
+                    )
+                    same = without is not None and abs(without - theirs) <= SAME
                     return (
-                        f"mjwrap's path touches {stop.name} {1e3 * beyond:.2g} mm beyond the end of OpenSim's cylinder; "
-                        f"mjwrap's has no ends"
+                        f"mjwrap's path touches {stop.name} {1e3 * beyond:.2g} mm beyond the end of OpenSim's "
+                        f"cylinder; mjwrap's has no ends"
+                        + "; without it the path has OpenSim's length"
+                        * same
                     )
     return ""
 
@@ -113,7 +127,9 @@ def _confirmed(routes: list[TouchingRoute], geodesic: Geodesic | None) -> str:
     if not routes:
         return ""
     closed = [closed_form_length(route) for route in routes]
-    gaps = [abs(other - route.length) for other, route in zip(closed, routes, strict=True) if other is not None]
+    gaps = [
+        abs(other - route.length) for other, route in zip(closed, routes, strict=True) if other is not None
+    ]
     if len(gaps) == len(routes) and max(gaps) <= SAME:
         return (
             f"OpenSim's path is not a geodesic: the closed form of a string over one cylinder or sphere has mjwrap's "
@@ -122,9 +138,13 @@ def _confirmed(routes: list[TouchingRoute], geodesic: Geodesic | None) -> str:
     if geodesic is None:
         return ""
     others = [geodesic(route) for route in routes]
-    gaps = [abs(other - route.length) for other, route in zip(others, routes, strict=True) if other is not None]
+    gaps = [
+        abs(other - route.length) for other, route in zip(others, routes, strict=True) if other is not None
+    ]
     if len(gaps) == len(routes) and max(gaps) <= SAME:
-        return "OpenSim's classic path is not a geodesic: OpenSim's Scholz2015GeometryPath has mjwrap's length"
+        return (
+            "OpenSim's classic path is not a geodesic: OpenSim's Scholz2015GeometryPath has mjwrap's length"
+        )
     return ""
 
 

@@ -48,7 +48,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class TouchingRoute:
-    """A converged route that touches a surface: its muscle, its length [m], and its stops without untouched surfaces."""
+    """A converged route that touches a surface: its muscle, length [m] and stops, untouched surfaces left out."""
 
     muscle: str
     length: float
@@ -62,11 +62,11 @@ class TouchingRoutes:
         self._muscles = muscles
         self._nodes = [node for m in muscles.declarations for route in m.routes for node in route.nodes]
 
-    def now(self) -> list[TouchingRoute]:
-        """Return those of the last evaluation."""
+    def now(self, data: mujoco.MjData) -> list[TouchingRoute]:
+        """Return those of the last evaluation, which was that of `data`."""
         muscles = self._muscles
         plan, state = muscles._plan, muscles._evaluation()
-        poses = state.scratch
+        poses = muscles.poses(data)
         found = []
         for c, route in enumerate(plan.routes):
             info = state.paths.info[c]
@@ -80,9 +80,13 @@ class TouchingRoutes:
                 continue
             first = self._point(poses, int(route[muscle_paths.R_FROM]))
             stops: list[Point | Touched] = [first]
-            for row, node, is_point, is_touched in zip(rows, self._nodes[low:high], points, touched, strict=True):
+            for row, node, is_point, is_touched in zip(
+                rows, self._nodes[low:high], points, touched, strict=True
+            ):
                 if is_point:
-                    stops.append(Point(muscles.model.site(node.site).name, row[layout.POS : layout.POS + 3].copy()))
+                    stops.append(
+                        Point(muscles.model.site(node.site).name, row[layout.POS : layout.POS + 3].copy())
+                    )
                 elif is_touched:
                     stops.append(self._surface(row, node, first.pos))
             stops.append(self._point(poses, int(route[muscle_paths.R_TO])))
@@ -95,7 +99,10 @@ class TouchingRoutes:
 
     def _surface(self, row: Array, node: Node, origin: Array) -> Touched:
         model = self._muscles.model
-        pos, turn = row[layout.POS : layout.POS + 3].copy(), row[layout.ROT : layout.ROT + 9].reshape(3, 3).copy()
+        pos, turn = (
+            row[layout.POS : layout.POS + 3].copy(),
+            row[layout.ROT : layout.ROT + 9].reshape(3, 3).copy(),
+        )
         ends = np.array([row[w : w + 3] for w in (layout.W_P, layout.W_Q)]) + origin
         cylinder = int(model.geom_type[node.geom]) == int(mujoco.mjtGeom.mjGEOM_CYLINDER)
         half = float(model.geom_size[node.geom, 1]) if cylinder else np.inf
