@@ -49,7 +49,9 @@ def main() -> None:
             model = mujoco.MjModel.from_xml_path(str(Path(folder) / "model.xml"))
         imported = ImportedModel(model)
         for what, motion in (("passive", reference.passive), ("driven", reference.driven)):
-            for step in options.steps if motion is not None else ():
+            if motion is None:
+                continue
+            for step in options.steps:
                 ours, frames = imported.motion(motion, step), trusted(motion)
                 gaps = [
                     np.abs(values - np.array(motion.coordinates[name]))[:frames].max()
