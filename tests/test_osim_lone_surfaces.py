@@ -1,4 +1,4 @@
-"""Closed forms that judge between paths: one cylinder or sphere, beside lengths worked out by hand and mjwrap's paths."""
+"""Closed forms that judge between paths over one cylinder or sphere, beside lengths by hand and mjwrap's paths."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_the_side_decides_the_way_round():
     above = np.pi - 2.0 * np.arctan2(0.05, 0.3)
     assert over == pytest.approx(tangents + 0.1 * (above - spent), rel=1e-14)
     assert under == pytest.approx(tangents + 0.1 * (2.0 * np.pi - above - spent), rel=1e-14)
-    assert under - over > 0.05
+    assert under != pytest.approx(over, abs=0.05)
 
 
 def test_a_sphere_is_a_circle_in_the_plane_of_ends_and_centre():
@@ -53,7 +53,7 @@ def test_it_is_the_length_of_solved_paths(surface):
             continue
         path = mw.solve_path(ends[0], ends[1], [mw.Obstacle(surface)])
         contact = path.contacts[0]
-        if not contact.active:
+        if contact.P is None or contact.Q is None:
             continue
         middle = 0.5 * (contact.P + contact.Q)
         assert closed_form_length(route(surface, ends, middle)) == pytest.approx(path.length, abs=1e-12)

@@ -75,3 +75,34 @@ def test_motions_that_do_not_fit_the_model_are_refused():
         mw.osim.motion_table(model, [0.0], np.zeros((1, 2)))
     with pytest.raises(mw.StateError, match="finite"):
         mw.osim.motion_table(model, [np.nan], np.zeros((1, 0)))
+
+
+def test_run_and_replay_write_the_motion_for_opensim(tmp_path, capsys):
+    model = compiled(NAME)
+    imported(NAME).save(tmp_path / "m.xml")
+    run = ["--duration", 0.05, "--excitation", "pulses", "--out", tmp_path / "s.sto", "--columns", "qpos"]
+    ran = run_here("run", capsys, tmp_path / "m.xml", *run, "--motion", tmp_path / "m.mot")
+    assert ran.code == 0, ran.err
+    motion, states = mw.read_table(tmp_path / "m.mot"), mw.read_table(tmp_path / "s.sto")
+    assert motion.metadata["inDegrees"] == "no"
+    assert len(motion.time) == 11
+    assert set(mw.osim.coordinates(model, mujoco.MjData(model))) == set(motion.names)
+    for name in (model.joint(i).name for i in range(model.njnt)):
+        assert np.array_equal(motion[name], states[f"qpos:{name}"])
+    assert (
+        np.ptp(motion["knee_angle_pat_r"]) > 1e-4
+    )  # the patella's coordinate is no joint, and follows the knee
+    again = ["--model", tmp_path / "m.xml", "--motion", tmp_path / "again.sto"]
+    ran = run_here("replay", capsys, tmp_path / "m.mot", *again)
+    assert ran.code == 0, ran.err
+    assert np.array_equal(mw.read_table(tmp_path / "again.sto").values, motion.values)
+
+
+@pytest.mark.parametrize("arguments", [["run", "m.xml"], ["replay", "m.mot", "--model", "m.xml"]])
+def test_a_motion_is_mot_or_sto(arguments, table, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    imported(NAME).save("m.xml")
+    mw.write_table("m.mot", table)
+    ran = run_here(arguments[0], capsys, *arguments[1:], "--motion", "m.csv")
+    assert ran.code == 2
+    assert "--motion 'm.csv'" in ran.err

@@ -47,7 +47,9 @@ def test_a_geodesic_that_nothing_confirms_is_not_explained():
 def test_a_closed_form_or_opensims_geodesic_confirms_mjwrap():
     assert "closed form" in reason(WRAPS, [route(touched())])
     off = route(touched(mw.Ellipsoid((0.1, 0.1, 0.4))), 1.0)
-    assert "Scholz2015GeometryPath has mjwrap's length" in reason(WRAPS, [off], geodesic=lambda _: 1.0 + 1e-10)
+    assert "Scholz2015GeometryPath has mjwrap's length" in reason(
+        WRAPS, [off], geodesic=lambda _: 1.0 + 1e-10
+    )
 
 
 def test_a_surface_that_acts_elsewhere_is_named():
@@ -62,6 +64,10 @@ def test_a_contact_beyond_the_end_of_a_cylinder(half, told):
     surface = touched(half=half)
     found = reason(POSE, [route(surface, 1.0)])
     assert ("touches w 50 mm beyond the end of OpenSim's cylinder" in found) == told
+    straight = replace(POSE, lengths={"m": float(np.linalg.norm(ENDS[0].pos - ENDS[1].pos))})
+    without = "without it the path has OpenSim's length"
+    assert (without in reason(straight, [route(surface, 1.0)])) == told
+    assert without not in found
     assert "beyond" not in reason(WRAPS, [route(surface, 1.0)])  # OpenSim wraps it, too
 
 

@@ -43,7 +43,7 @@ def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int
         mujoco.mj_forward(model, data)
         muscles.reset(data)
         muscles.forward(data)
-        for route in paths.now():
+        for route in paths.now(data):
             name, length = route.muscle, route.length
             count += 1
             try:

@@ -13,7 +13,6 @@ from mjwrap.files.table import Table
 from mjwrap.files.writing import RowWriter
 from mjwrap.osim.coordinates import coordinates
 
-
 _HEADER = {"header": "Coordinates", "inDegrees": "no"}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mujoco
 
@@ -22,7 +23,7 @@ def write_page(
     counts = report.counted()
     kinds = list(dict.fromkeys(kind for kind, _ in counts))
     page = report_template("mjwrap.cli.importing").render(
-        model=model,
+        model=Path(model).name,
         command=command,
         versions=f"MuJoCo {mujoco.__version__}, mjwrap {mjwrap.__version__}",
         version=report.version,
@@ -43,7 +44,7 @@ def _entry(entry: Entry) -> list[str]:
 def _verification(found: Verification) -> dict[str, object]:
     """Return the values of the part about OpenSim."""
     differences = sorted(
-        found.differences, key=lambda d: (not d.reason.startswith(UNEXPLAINED), d.reason, d.name, d.pose)
+        found.differences, key=lambda d: (not d.reason.startswith(UNEXPLAINED), d.reason, d.name, d.pose or 0)
     )
     return {
         "opensim": found.reference.opensim,
@@ -54,9 +55,10 @@ def _verification(found: Verification) -> dict[str, object]:
             for q in found.quantities
         ],
         "differences": [
-            [d.what, d.name, str(d.pose), f"{d.opensim:.6g}", f"{d.mjwrap:.6g}",
+            [d.what, d.name, "" if d.pose is None else str(d.pose), f"{d.opensim:.6g}", f"{d.mjwrap:.6g}",
              f"{d.mjwrap - d.opensim:+.3g} {d.unit}", d.reason]
             for d in differences
         ],
+        "unexplained": len(found.unexplained),
         "missing": found.missing,
     }  # fmt: skip

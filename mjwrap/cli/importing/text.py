@@ -45,10 +45,12 @@ def tell_verification(found: Verification) -> str:
     reasons: dict[str, list[str]] = {}
     for d in found.differences:
         reasons.setdefault(d.reason, []).append(
-            f"{d.what} of {d.name}, pose {d.pose}: {d.mjwrap:.6g} {d.unit}, OpenSim {d.opensim:.6g} {d.unit}"
+            f"{d.what} of {d.name}{'' if d.pose is None else f', pose {d.pose}'}: {d.mjwrap:.6g} {d.unit}, "
+            f"OpenSim {d.opensim:.6g} {d.unit}"
         )
     if found.differences:
-        lines.append(f"{counted(len(found.differences), 'difference')} above 1 mm or 1 %:")
+        count = counted(len(found.differences), "difference")
+        lines.append(f"{count} above 1 mm or 1 %, {len(found.unexplained)} not explained:")
         for reason, cases in sorted(reasons.items(), key=lambda item: -len(item[1])):
             lines.append(f"  {reason} ({len(cases)}); for example {cases[0]}")
     lines += [f"not compared: {text}" for text in found.missing]

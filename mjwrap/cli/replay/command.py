@@ -81,7 +81,17 @@ def settings(options: argparse.Namespace) -> ReplaySettings:
     for option in (
         ()
         if is_table
-        else ("model", "keyframe", "side_rule", "record", "connect", *RECORDING_DETAILS, "out", "analysis", "motion")
+        else (
+            "model",
+            "keyframe",
+            "side_rule",
+            "record",
+            "connect",
+            *RECORDING_DETAILS,
+            "out",
+            "analysis",
+            "motion",
+        )
     ):
         if getattr(options, option):
             raise UserError(

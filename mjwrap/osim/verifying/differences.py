@@ -24,11 +24,12 @@ SMALLEST = 1e-12  # of the mass matrix's diagonal, as a share of its largest ele
 
 @dataclass(frozen=True)
 class Difference:
-    """A difference that needs a reason: of `what` ("length", ...) in element `name` at pose number `pose`."""
+    """A difference that needs a reason: of `what` ("length", ...) in element `name` at pose number `pose`, None for a
+    motion."""
 
     what: str
     name: str
-    pose: int
+    pose: int | None
     opensim: float
     mjwrap: float
     unit: str
@@ -260,14 +261,14 @@ def _compare_motion(
             theirs = motion.coordinates[coordinate][k]
             place = f"{coordinate}, {motion.time[k]:g} s"
             found.differences.append(
-                Difference(name, place, 0, theirs, theirs + float(gap[k]), "rad, m", why)
+                Difference(name, place, None, theirs, theirs + float(gap[k]), "rad, m", why)
             )
 
 
 def _motion_reason(
     imported: ImportedModel, motion: MotionNumbers, ours: SimulatedMotion, gaps: list[Array]
 ) -> str:
-    """Return why coordinates differ along a motion, from OpenSim's energy or from its muscles up to where they begin to."""
+    """Return why coordinates differ along a motion, from OpenSim's energy or from its muscles."""
     lost = abs(motion.energy[-1] - motion.energy[0]) if motion.energy else 0.0
     if lost > LOSS and abs(ours.energy_change) < 0.01 * lost:
         return f"OpenSim's motion changes its energy by {lost:.2g} J, mjwrap's by {abs(ours.energy_change):.1g} J"

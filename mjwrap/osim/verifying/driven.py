@@ -85,7 +85,10 @@ def _other_paths(compared: Compared) -> str:
     changed = [ours for _, sample, ours in compared if _apart(sample, ours) and not _contradicts(sample)]
     own, theirs = _largest(o.missing for o in changed), _largest(o.missing_with_theirs for o in changed)
     if np.isfinite(own):
-        text += f"; forces and accelerations differ by {100 * own:.2g} %, and by {100 * theirs:.2g} % with OpenSim's tensions"
+        text += (
+            f"; forces and accelerations differ by {100 * own:.2g} %, and with OpenSim's tensions by "
+            f"{100 * theirs:.2g} %"
+        )
         if theirs > 0.5 * own:
             return ""
     return text

@@ -103,7 +103,7 @@ class ImportedModel:
             if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, written := body_name(name)) >= 0
         }
         lengths = dict(zip(muscles.names, muscles.length.tolist(), strict=True))
-        routes = self._routes.now()
+        routes = self._routes.now(data)
         statuses = {muscles.names[i]: muscles.reason(int(i)) for i in np.flatnonzero(muscles.status)}
         touched = {name: len(muscles.contact_points(i)) for i, name in enumerate(muscles.names)}
         arms = self._arms(pose, independent) if pose.moment_arms else {}

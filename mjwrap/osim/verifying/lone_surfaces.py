@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,7 @@ def closed_form_length(route: TouchingRoute) -> float | None:
     straight line once the cylinder is unrolled; over one sphere it lies in the plane of its ends and the centre.
     """
     total, stops = 0.0, route.stops
-    for k, (before, after) in enumerate(zip(stops[:-1], stops[1:], strict=True)):
+    for k, (before, after) in enumerate(pairwise(stops)):
         if isinstance(before, Point) and isinstance(after, Point):
             total += float(np.linalg.norm(after.pos - before.pos))
         elif isinstance(before, Point) and isinstance(after, Touched):

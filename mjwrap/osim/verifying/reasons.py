@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def length_reason(
     return (
         _short_arc(contacts)
         or _other_segment(pose.segments.get(name, {}), routes)
-        or _beyond_end(contacts, routes)
+        or _beyond_end(contacts, routes, pose.lengths[name])
         or _not_taut(contacts)
         or _jump(pose.slopes.get(name, {}))
         or _confirmed(routes, geodesic)
@@ -100,16 +101,23 @@ def _other_segment(segments: dict[str, list[str]], routes: list[TouchingRoute]) 
     return ""
 
 
-def _beyond_end(contacts: dict[str, list[float]], routes: list[TouchingRoute]) -> str:
-    """Return that a contact lies beyond the end of a cylinder that OpenSim's path does not wrap."""
+def _beyond_end(contacts: dict[str, list[float]], routes: list[TouchingRoute], theirs: float) -> str:
+    """Return that a contact lies beyond the end of a cylinder that OpenSim's path does not wrap, and whether the path
+    without it has OpenSim's length [m]."""
     for route in routes:
         for stop in route.stops:
             if isinstance(stop, Touched) and stop.name not in contacts:
                 beyond = float(np.abs(stop.contact[:, 2]).max()) - stop.half
                 if beyond > BEYOND:
+                    without = closed_form_length(
+                        replace(route, stops=[s for s in route.stops if s is not stop])
+                    )
+                    same = without is not None and abs(without - theirs) <= SAME
                     return (
-                        f"mjwrap's path touches {stop.name} {1e3 * beyond:.2g} mm beyond the end of OpenSim's cylinder; "
-                        f"mjwrap's has no ends"
+                        f"mjwrap's path touches {stop.name} {1e3 * beyond:.2g} mm beyond the end of OpenSim's "
+                        f"cylinder; mjwrap's has no ends"
+                        + "; without it the path has OpenSim's length"
+                        * same
                     )
     return ""
 

@@ -14,8 +14,8 @@ from mjwrap.surfaces import Cylinder, Ellipsoid, Sphere, Torus
 def scholz_length(opensim: Any, route: TouchingRoute) -> float | None:
     """Return the length [m] of OpenSim's geodesic path over a route's stops, fixed in the world, or None.
 
-    The hint of each surface is the middle of mjwrap's contact chord: with others OpenSim's path may stay wound. None for
-    a surface that OpenSim's path does not have. `RuntimeError` where OpenSim throws.
+    The hint of each surface is the middle of mjwrap's contact chord: with others OpenSim's path may stay wound.
+    None for a surface that OpenSim's path does not have. `RuntimeError` where OpenSim throws.
     """
     model = opensim.Model()
     ground = model.getGround()

@@ -48,7 +48,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class TouchingRoute:
-    """A converged route that touches a surface: its muscle, its length [m], and its stops without untouched surfaces."""
+    """A converged route that touches a surface: its muscle, length [m] and stops, untouched surfaces left out."""
 
     muscle: str
     length: float
@@ -62,11 +62,11 @@ class TouchingRoutes:
         self._muscles = muscles
         self._nodes = [node for m in muscles.declarations for route in m.routes for node in route.nodes]
 
-    def now(self) -> list[TouchingRoute]:
-        """Return those of the last evaluation."""
+    def now(self, data: mujoco.MjData) -> list[TouchingRoute]:
+        """Return those of the last evaluation, which was that of `data`."""
         muscles = self._muscles
         plan, state = muscles._plan, muscles._evaluation()
-        poses = state.scratch
+        poses = muscles.poses(data)
         found = []
         for c, route in enumerate(plan.routes):
             info = state.paths.info[c]

@@ -28,7 +28,7 @@ class MeshFiles:
     """Mesh files as assets of a document, each read once; `folders` are searched in order."""
 
     def __init__(self, document: Document, folders: Sequence[Path]) -> None:
-        self.document, self.folders = document, folders
+        self.document, self.folders = document, list(dict.fromkeys(folders))
         self.files: dict[Path, str | MeshError] = {}  # name of the asset, or why there is none
         self.meshes: dict[tuple[str, tuple[float, ...]], str] = {}
         self.corners: dict[str, Array] = {}  # of the triangles of an asset (m, 3, 3)
