@@ -186,3 +186,32 @@ def test_a_body_called_world(imported):
     mujoco.mj_forward(compiled, data)
     assert compiled.body("world_").id == 1
     assert np.isfinite(data.qacc).all()
+
+
+# OpenSim 4.6: Schutte1993Muscle_Deprecated with its default curves, max_isometric_force 1000 N, tendon_slack_length
+# 0.2 m, pennation 0.2 rad, path length 0.3 m, at equilibrium by computeEquilibrium; optimal fibre length 0.1 m / x:
+# x -> tension at activations 0.05 and 1 [share of max_isometric_force].
+SCHUTTE = {0.6: (0.0310, 0.5262), 1.0: (0.0681, 0.9812), 1.3: (0.2063, 0.8247), 2.0: (3.2862, 3.3178)}
+
+
+@pytest.mark.parametrize("stretch", SCHUTTE)
+def test_how_far_a_schutte_muscle_is_from_its_law(imported, stretch):
+    numbers = {
+        "max_isometric_force": 1000,
+        "optimal_fiber_length": 0.1 / stretch,
+        "tendon_slack_length": 0.2,
+        "pennation_angle_at_optimal": 0.2,
+    }
+    given = "".join(f"<{tag}>{value}</{tag}>" for tag, value in numbers.items())
+    line = (
+        path().replace("-0.2 0.06 0", "0 0 0").replace("0.3 0.06 0", "0 0 0.3")
+    )  # along the hinge: always 0.3 m
+    kind = "Schutte1993Muscle_Deprecated"
+    found = imported(model(forces=f'<{kind} name="m">{line}{given}</{kind}>'))
+    (entry,) = [entry for entry in found.report.entries if entry.kind == kind]
+    compiled = found.spec.compile()
+    law = mw.MuscleSystem(compiled)["m"].parameters
+    ours = [mw.simulate_muscle(law, [0.0], 0.3, activation=a).tension[0] / 1000.0 for a in (0.05, 1.0)]
+    size = np.abs(np.array(ours) - SCHUTTE[stretch]).max()
+    assert (entry.outcome, entry.unit) == ("approximated", "F_max")
+    assert entry.size == pytest.approx(size, abs=1e-4)  # the frozen numbers have four digits

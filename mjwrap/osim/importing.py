@@ -146,9 +146,9 @@ def write_paths(
     ]
     wraps = {wrap.name: write_wrap(document, report, wrap, geoms, sites) for wrap in model.wraps}
     written = {name: wrap for name, wrap in wraps.items() if wrap is not None}
-    used = any(pull.path.wraps for pull in pulls)
+    used = any(pull.path.wraps or (isinstance(pull, Muscle) and pull.splines) for pull in pulls)
     samples = sampled_poses(model, poses) if used else []
-    muscles = MuscleWriter(document, report, RouteWriter(report, sites, written, samples))
+    muscles = MuscleWriter(document, report, RouteWriter(report, sites, written, samples), samples)
     for pull in pulls:
         muscles.write(pull)
     if any(muscles.default_activations):

@@ -9,11 +9,14 @@ from collections.abc import Sequence
 from mjwrap.mjcf.parameters import NUMERICS
 from mjwrap.mjcf.wrapping_geoms import SIZES
 from mjwrap.osim.description.forces import Ligament, Muscle, PathActuator, PathSpring
+from mjwrap.osim.kinematics import path_length
 from mjwrap.osim.report import APPROXIMATED, EXACT, LEFT_OUT, Report
 from mjwrap.osim.writing.document import Document
+from mjwrap.osim.writing.isometric import largest_difference
 from mjwrap.osim.writing.laws import WrittenLaw, law_of, refusal
 from mjwrap.osim.writing.piece_algebra import flattened
 from mjwrap.osim.writing.routes import Route, RouteWriter
+from mjwrap.osim.writing.segment_scan import Sample
 from mjwrap.osim.writing.stable_step import PathLine
 from mjwrap.osim.writing.unique_names import UniqueNames
 
@@ -27,8 +30,10 @@ class MuscleWriter:
     `default_activations` has one number for each state written, `lines` the muscles and the sites of their paths.
     """
 
-    def __init__(self, document: Document, report: Report, routes: RouteWriter) -> None:
-        self._document, self._report, self._routes = document, report, routes
+    def __init__(
+        self, document: Document, report: Report, routes: RouteWriter, poses: Sequence[Sample]
+    ) -> None:
+        self._document, self._report, self._routes, self._poses = document, report, routes, poses
         self._actuators = UniqueNames(
             document, *(each.tag for each in document.section("actuator")), section="actuator"
         )
@@ -58,8 +63,25 @@ class MuscleWriter:
             self.lines.append(PathLine(pull, tuple(route.sites)))
             if law.own_states:
                 self.default_activations += [float(pull.parameters.get("default_activation", 0.0)), 0.0]
+        size = self._measured(pull, law) if law.remarks and isinstance(pull, Muscle) else None
+        if size is not None:
+            law.remarks.append(
+                "largest difference of the tension at rest at the sampled poses, without surfaces"
+            )
         outcome = APPROXIMATED if law.remarks else EXACT
-        self._report.add(kind, pull.name, outcome, "; ".join([f"law {law.name}", *law.remarks]))
+        text = "; ".join([f"law {law.name}", *law.remarks])
+        self._report.add(
+            kind, pull.name, outcome, text, math.nan if size is None else size, "F_max" * (size is not None)
+        )
+
+    def _measured(self, muscle: Muscle, law: WrittenLaw) -> float | None:
+        """Return how far a law's tension is from that of the curves in the file, at the longest, a middle and the
+        shortest straight path of the sampled poses [F_max]; None where the file has no curves."""
+        if not muscle.splines or not self._poses:
+            return None
+        lengths = sorted(path_length(muscle.path, pose.bodies, pose.values) for pose in self._poses)
+        chosen = {lengths[k] for k in (0, len(lengths) // 2, -1)} - {0.0}
+        return largest_difference(muscle, law, chosen)
 
     def _driven(self, name: str, route: Route, law: WrittenLaw, controls: tuple[float, float]) -> None:
         """Write a muscle that an actuator drives, with a tendon over its sites for MuJoCo's sake."""
