@@ -72,7 +72,9 @@ def smooth_motion(model: mujoco.MjModel, frames: int) -> mw.Motion:
         low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-1.0, 1.0)
         size = 0.15 * (high - low)
         middle = min(max(float(start[at]), low + size), high - size)
-        qpos[:, at] = middle + size * np.sin(2.0 * np.pi * rng.uniform(0.4, 1.0) * when + rng.uniform(0.0, 6.3))
+        qpos[:, at] = middle + size * np.sin(
+            2.0 * np.pi * rng.uniform(0.4, 1.0) * when + rng.uniform(0.0, 6.3)
+        )
     placed = np.ascontiguousarray(qpos.T)
     CoupledJoints(model).place(placed)
     return mw.Motion(when, np.ascontiguousarray(placed.T))
@@ -145,7 +147,14 @@ def beside_opensim(path: str, frames: int) -> dict[str, Any]:
         theirs.printToXML(str(Path(folder, "model.osim")))
         values = [coordinate_values(model, qpos) for qpos in motion.qpos]
         names = list(values[0])
-        lines = ["motion", "version=1", f"nRows={frames}", f"nColumns={len(names) + 1}", "inDegrees=no", "endheader"]
+        lines = [
+            "motion",
+            "version=1",
+            f"nRows={frames}",
+            f"nColumns={len(names) + 1}",
+            "inDegrees=no",
+            "endheader",
+        ]
         lines.append("\t".join(["time", *names]))
         for when, row in zip(motion.time, values, strict=True):
             lines.append("\t".join(f"{x:.17g}" for x in (when, *row.values())))
@@ -154,8 +163,16 @@ def beside_opensim(path: str, frames: int) -> dict[str, Any]:
         run(str(Path(folder, "model.osim")), str(Path(folder, "motion.mot")), folder, motion.time[-1], 1e-4)
         other = time.process_time() - begin
     ratio = other / mine
-    print(f"{Path(path).name}: OpenSim {1e3 * other / frames:.2f} ms, mjwrap {1e6 * mine / frames:.0f} us a frame: {ratio:.0f} times")
-    return {"model": Path(path).name, "frames": frames, "opensim": other, "mjwrap": mine, "reached": ratio >= LEAST_RATIO}
+    print(
+        f"{Path(path).name}: OpenSim {1e3 * other / frames:.2f} ms, mjwrap {1e6 * mine / frames:.0f} us a frame: {ratio:.0f} times"
+    )
+    return {
+        "model": Path(path).name,
+        "frames": frames,
+        "opensim": other,
+        "mjwrap": mine,
+        "reached": ratio >= LEAST_RATIO,
+    }
 
 
 def coordinate_values(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, float]:
