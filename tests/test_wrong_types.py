@@ -137,6 +137,7 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "muscle_xml": (model, "X", "BRA_origin,BRA_insertion"),
         "read_table": (folder / "t.csv",),
         "solve_path": (*ENDS, [BALL]),
+        "static_optimization": (muscles, motion),
         "solve_sweep": (*ENDS, [BALL], np.zeros((2, 1, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1, 1))),
         "write_table": (folder / "u.csv", TABLE),
     }
@@ -226,7 +227,8 @@ EXPENSIVE = {"ImplicitSurface", "ParametricSurface", "implausible", "length_rang
 EXPENSIVE |= {f"fit_{shape}" for shape in SHAPES}
 RESULTS = {  # that functions return; nobody makes them
     "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "Imported", "JointCurves",
-    "LengthRange", "MuscleAnalysis", "MuscleTrial", "ParameterReport", "PathSolution", "Status", "SweepSolution",
+    "LengthRange", "MuscleAnalysis", "MuscleTrial", "ParameterReport", "PathSolution", "StaticOptimization", "Status",
+    "SweepSolution",
 }  # fmt: skip
 
 
