@@ -9,7 +9,7 @@ from doc_commands import FENCE, ROOT
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 
 
-ROOMS_OF = ("mjwrap", "mjwrap/cli", "mjwrap/kernels", "mjwrap/plugin", "mjwrap/surfaces", "benchmarks")
+ROOMS_OF = ("mjwrap", "mjwrap/cli", "mjwrap/inverse", "mjwrap/kernels", "mjwrap/plugin", "mjwrap/surfaces", "benchmarks")
 
 
 def rooms_named() -> dict[str, str]:

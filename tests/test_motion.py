@@ -201,6 +201,10 @@ def test_missing_columns_are_named_and_can_be_given() -> None:
     found = mw.Motion.from_table(model, table, missing={"knee": -0.4, "ankle": 0.1, "hip": 9.0})
     assert found.qpos[1, model.joint("ankle").qposadr[0]] == 0.1
     assert found.qpos[1, model.joint("hip").qposadr[0]] == 0.0
+    with pytest.raises(
+        mw.StateError, match=r"missing: no independent coordinate 'kne' \(did you mean 'knee'\?\)"
+    ):
+        mw.Motion.from_table(model, table, missing={"kne": 0.0})
 
 
 def test_columns_of_followers_are_compared_and_a_difference_is_a_warning() -> None:

@@ -89,6 +89,8 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
     model, data, muscles, path = (given[k] for k in ("MjModel", "MjData", "MuscleSystem", "PathSolution"))
     mw.write_table(folder / "t.csv", TABLE)
     mesh = mujoco.MjModel.from_xml_string(MESH)
+    motion = mw.Motion(np.arange(2.0), np.zeros((2, model.nq)))
+    flexion = mw.Table(np.arange(2.0), ("elbow_flexion",), np.zeros((2, 1)))
 
     def spec() -> mujoco.MjSpec:
         return mujoco.MjSpec.from_file(ELBOW)
@@ -101,8 +103,11 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "DeGrooteFregly2016": (100.0, 0.1, 0.1),
         "Ellipsoid": ((0.1, 0.2, 0.3),),
         "EllipticCylinder": ((0.1, 0.2),),
+        "ExternalForce": ("b", np.arange(2.0), np.zeros((2, 3))),
+        "ExternalLoads": ([],),
         "Ligament": (100.0, 0.1, CURVE),
         "Millard2012": (100.0, 0.1, 0.1),
+        "Motion": (np.arange(2.0), np.zeros((2, 1))),
         "MuJoCoMuscle": (PRM, (0.1, 0.2), 1.0),
         "MuscleSystem": (model,),
         "Obstacle": (mw.Sphere(0.03),),
@@ -124,12 +129,15 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "implausible": (muscles,),
         "import_osim": ("mjwrap:leg",),
         "insert_xml": ("<mujoco></mujoco>", "<custom/>"),
+        "inverse_dynamics": (model, motion),
         "length_ranges": (muscles,),
         "load": (ELBOW,),
         "mesh_points": (mesh, "g"),
+        "muscle_analysis": (muscles, motion),
         "muscle_xml": (model, "X", "BRA_origin,BRA_insertion"),
         "read_table": (folder / "t.csv",),
         "solve_path": (*ENDS, [BALL]),
+        "static_optimization": (muscles, motion),
         "solve_sweep": (*ENDS, [BALL], np.zeros((2, 1, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1, 1))),
         "write_table": (folder / "u.csv", TABLE),
     }
@@ -160,6 +168,12 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
     }  # fmt: skip
     for name, arguments in ways.items():
         found[f"PathSolution.{name}"] = lambda n=name, a=arguments: Call(getattr(path, n), a)
+    found["Motion.from_table"] = lambda: Call(mw.Motion.from_table, (model, flexion))
+    found["Motion.low_pass"] = lambda: Call(
+        mw.Motion(np.arange(90.0), np.zeros((90, 1))).low_pass, (model, 0.1)
+    )
+    found["Motion.completed"] = lambda: Call(motion.completed, (model,))
+    found["ExternalLoads.from_osim"] = lambda: Call(mw.ExternalLoads.from_osim, ("absent.xml",))
     found["plugin.native"] = lambda: Call(plugin.native, (mw.load(ELBOW),))
     found["plugin.read"] = lambda: Call(plugin.read, (mujoco.MjData(mw.load(ELBOW)),))
     return found
@@ -213,7 +227,8 @@ EXPENSIVE = {"ImplicitSurface", "ParametricSurface", "implausible", "length_rang
 EXPENSIVE |= {f"fit_{shape}" for shape in SHAPES}
 RESULTS = {  # that functions return; nobody makes them
     "Contact", "Energetics", "FiberFit", "Finding", "Fit", "HillFit", "Implausible", "Imported", "JointCurves",
-    "LengthRange", "MuscleTrial", "ParameterReport", "PathSolution", "Status", "SweepSolution",
+    "LengthRange", "MuscleAnalysis", "MuscleTrial", "ParameterReport", "PathSolution", "StaticOptimization", "Status",
+    "SweepSolution",
 }  # fmt: skip
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjwrap.errors import OsimError, TableError
+from mjwrap import validation
+from mjwrap.errors import OsimError, SignalError, TableError
 from mjwrap.files import Table, read_table
 from mjwrap.files.atomic import as_path
-from mjwrap.inverse.external_force import ExternalForce
+from mjwrap.inverse.external_force import INTERPOLATIONS, ExternalForce
 from mjwrap.osim.reading.document import read_document
 from mjwrap.osim.reading.nodes import Node
 
@@ -23,6 +24,8 @@ def read_external_loads(
 ) -> list[ExternalForce]:
     """Return the external forces of a file that are not switched off; see `ExternalLoads.from_osim`."""
     file = Path(as_path(path, OsimError))
+    validation.optional(table, Table, "table", TableError, "a Table, as from mw.read_table")
+    validation.choice(interpolation, INTERPOLATIONS, "interpolation", SignalError)
     root = read_document(file)
     loads = next((node for node in root.walk() if node.tag == "ExternalLoads"), None)
     if loads is None:

@@ -106,7 +106,8 @@ class Motion:
             TableError: columns are missing, or angles so far outside a joint's range that only degrees explain them.
             StateError: a coordinate has no such value, or the filter does not fit the times.
         """
-        qpos = table_positions(model, table, missing or {}, cutoff, order)
+        validation.choice(ends, ENDS, "ends", StateError)
+        qpos = table_positions(model, table, missing, cutoff, order)
         return cls(table.time, qpos, ends=ends)
 
     def low_pass(self, model: mujoco.MjModel, cutoff: float, order: int = 3) -> Motion:

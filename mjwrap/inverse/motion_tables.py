@@ -17,8 +17,10 @@ from mjwrap.inverse.filtering import check_filter, low_pass
 from mjwrap.inverse.splines import continuous
 from mjwrap.mjcf import name_of, qpos_names
 from mjwrap.mjcf.coordinate_functions import CoordinateFunction
+from mjwrap.mjcf.names import listed
 from mjwrap.osim.coordinate_frames import CoordinateFrames
 from mjwrap.runs.angles import check_column
+from mjwrap.text import nearest
 
 Array = NDArray[np.float64]
 OFF = 1e-3  # [rad or m] difference of a column from what its coordinate's leaders give, from which a warning tells
@@ -26,18 +28,22 @@ _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLI
 
 
 def table_positions(
-    model: mujoco.MjModel, table: Table, missing: Mapping[str, float], cutoff: float | None, order: int
+    model: mujoco.MjModel, table: Table, missing: Mapping[str, float] | None, cutoff: float | None, order: int
 ) -> Array:
     """Return positions (T, nq); arguments and errors as of `Motion.from_table`."""
     validation.of_type(model, "MjModel", "model", StateError)
     validation.instance(table, Table, "table", TableError, "a Table, as from mw.read_table")
-    validation.instance(missing, Mapping, "missing", StateError, "a dict of values by coordinate")
+    validation.optional(missing, Mapping, "missing", StateError, "a dict of values by coordinate")
+    validation.whole(order, 1, "order", StateError)
     frames = CoordinateFrames(model)
+    wanted = _wanted(model, frames)
     columns = _columns(model, table, frames.functions)
     values = {name: _values(model, table, column, name, frames.functions) for name, column in columns.items()}
-    for name, value in missing.items():
+    for name, value in (missing or {}).items():
+        if name not in wanted:
+            known = f"{nearest(str(name), wanted)}; coordinates: {listed(wanted)}"
+            raise StateError(f"missing: no independent coordinate '{name}'{known}")
         values.setdefault(name, np.full(len(table.time), validation.finite(value, f"'{name}'", StateError)))
-    wanted = _wanted(model, frames)
     absent = [name for name in wanted if name not in values]
     if absent:
         where = f"'{table.source}'" if table.source else "the table"
