@@ -9,7 +9,9 @@ from doc_commands import FENCE, ROOT
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 
 
-ROOMS_OF = ("mjwrap", "mjwrap/cli", "mjwrap/inverse", "mjwrap/kernels", "mjwrap/plugin", "mjwrap/surfaces", "benchmarks")
+ROOMS_OF = (
+    "mjwrap", "mjwrap/cli", "mjwrap/inverse", "mjwrap/kernels", "mjwrap/plugin", "mjwrap/surfaces", "benchmarks",
+)  # fmt: skip
 
 
 def rooms_named() -> dict[str, str]:

@@ -4,13 +4,14 @@
     python benchmarks/inverse/bench_static_optimization.py --opensim MODEL.osim [--frames N]
 
 The first form takes models of the package myo_sim, along a smooth motion about their first pose. A run is everything:
-velocities and accelerations by splines, paths, moment arms, forces, inverse dynamics, optimisation. It prints the median
-over the repetitions, in CPU time of the process on one thread, the shares of the parts, and how much faster two threads
-are by the clock on the wall, which needs two idle cores. With --target, exit code 1 where a limb is below 5,000 frames a second, the
-full body below 1,000, or two threads below 1.7 times one.
+velocities and accelerations by splines, paths, moment arms, forces, inverse dynamics, optimisation. It prints the
+median over the repetitions, in CPU time of the process on one thread, the shares of the parts, and how much faster two
+threads are by the clock on the wall, which needs two idle cores. With --target, exit code 1 where a limb is below 5,000
+frames a second, the full body below 1,000, or two threads below 1.7 times one.
 
-The second form needs the package `opensim`. It runs OpenSim's StaticOptimization and mjwrap on the same file along the same
-motion of its coordinates, one after the other in one process, and prints the ratio; with --target, exit code 1 below 500.
+The second form needs the package `opensim`. It runs OpenSim's StaticOptimization and mjwrap on the same file along the
+same motion of its coordinates, one after the other in one process, and prints the ratio; with --target, exit code 1
+below 500.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ import numpy as np
 
 import mjwrap as mw
 from mjwrap.mjcf.couplings import CoupledJoints
+from mjwrap.runs import load
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "speed"))
+MODELS = {"arm": "myoarm", "legs": "myolegs", "full body": "myofullbody"}
 LEAST = {"full body": 1000.0}  # frames a second
 LEAST_LIMB, LEAST_THREADS, LEAST_RATIO = 5000.0, 1.7, 500.0
 REPETITIONS = 5
@@ -51,7 +53,7 @@ def main() -> int:
 
 def read_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--models", nargs="+", default=["arm", "legs", "full body"])
+    parser.add_argument("--models", nargs="+", default=list(MODELS), choices=list(MODELS))
     parser.add_argument("--opensim", help="an .osim file to run both on")
     parser.add_argument("--frames", type=int, default=1000)
     parser.add_argument("--json")
@@ -60,7 +62,7 @@ def read_arguments() -> argparse.Namespace:
 
 
 def smooth_motion(model: mujoco.MjModel, frames: int) -> mw.Motion:
-    """Return a motion of all hinges and slides about the first pose, within their ranges; followers where they belong."""
+    """Return a motion of all hinges and slides about the first pose, within their ranges, with their followers."""
     rng = np.random.default_rng(1)
     when = np.arange(frames) / RATE
     start = model.key_qpos[0] if model.nkey else model.qpos0
@@ -93,9 +95,7 @@ def seconds(run: Callable[[], Any], clock: Callable[[], float]) -> float:
 
 def measure(label: str, frames: int) -> dict[str, Any]:
     """Return and print a row of one model of myo_sim."""
-    from installed_models import compiled
-
-    model = compiled(label, None)
+    model = load(f"myo_sim:{MODELS[label]}")
     muscles = mw.MuscleSystem(model)
     motion = smooth_motion(model, frames)
     whole, cpu = motion.completed(model), time.process_time
@@ -122,7 +122,8 @@ def measure(label: str, frames: int) -> dict[str, Any]:
     shares = ", ".join(f"{name} {each:.0f}" for name, each in row["microseconds"].items())
     print(
         f"{label}: {muscles.n} muscles, {row['coordinates']} coordinates, {row['solved']} of {frames} frames solved; "
-        f"{row['frames per second']:,.0f} frames a second (us: {shares}); two threads x {row['two threads over one']:.2f}",
+        f"{row['frames per second']:,.0f} frames a second (us: {shares}); "
+        f"two threads x {row['two threads over one']:.2f}",
         flush=True,
     )
     return row
@@ -163,16 +164,10 @@ def beside_opensim(path: str, frames: int) -> dict[str, Any]:
         run(str(Path(folder, "model.osim")), str(Path(folder, "motion.mot")), folder, motion.time[-1], 1e-4)
         other = time.process_time() - begin
     ratio = other / mine
-    print(
-        f"{Path(path).name}: OpenSim {1e3 * other / frames:.2f} ms, mjwrap {1e6 * mine / frames:.0f} us a frame: {ratio:.0f} times"
-    )
-    return {
-        "model": Path(path).name,
-        "frames": frames,
-        "opensim": other,
-        "mjwrap": mine,
-        "reached": ratio >= LEAST_RATIO,
-    }
+    each = 1e6 * other / frames, 1e6 * mine / frames
+    print(f"{Path(path).name}: OpenSim {each[0]:,.0f} us, mjwrap {each[1]:.0f} us a frame: {ratio:.0f} times")
+    reached = ratio >= LEAST_RATIO
+    return {"model": Path(path).name, "frames": frames, "microseconds": each, "reached": reached}
 
 
 def coordinate_values(model: mujoco.MjModel, qpos: np.ndarray) -> dict[str, float]:
