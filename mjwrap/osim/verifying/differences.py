@@ -152,8 +152,8 @@ def _not_compared(reference: Reference, imported: ImportedModel) -> list[str]:
 def _compare_bodies(
     every: dict[str, Quantity], found: Verification, pose: PoseNumbers, ours: ImportedNumbers, k: int
 ) -> str:
-    """Compare coordinates, bodies and mass; return why paths differ, too, if the coordinates do, else ""."""
-    apart = 0.0
+    """Compare coordinates, bodies and mass; return why paths differ, too, if bodies do, else ""."""
+    apart, moved = 0.0, 0.0
     for name, value in pose.coordinates.items():
         if name in ours.coordinates:
             gap = ours.coordinates[name] - value
@@ -161,13 +161,14 @@ def _compare_bodies(
             every["coordinate"].add(gap, f"{name}, pose {k}")
     elsewhere = ""
     if apart > LARGE:
-        elsewhere = f"coordinates differ by up to {apart:.2g} rad or m: constraints that setting by name does not satisfy"
+        elsewhere = f"coordinates differ by up to {apart:.2g} rad or m: constraints that setting by name does not meet"
     why = elsewhere or f"{UNEXPLAINED}: the same coordinates"
     for name, place in pose.bodies.items():
         if name not in ours.bodies:
             continue
         theirs, mine = np.array(place), ours.bodies[name]
         shift = float(np.abs(mine[:3] - theirs[:3]).max())
+        moved = max(moved, shift)
         every["position"].add(shift, f"{name}, pose {k}")
         turn = mine[3:].reshape(3, 3) @ theirs[3:].reshape(3, 3).T
         skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
@@ -184,6 +185,8 @@ def _compare_bodies(
         every["mass"].add(share, f"pose {k}")
         if not share <= RELATIVE:
             found.differences.append(Difference("mass", "reduced mass matrix", k, 0.0, share, "", why))
+    if moved > LARGE and not elsewhere:
+        return f"{UNEXPLAINED}: bodies are up to {1e3 * moved:.2g} mm apart"
     return elsewhere
 
 
