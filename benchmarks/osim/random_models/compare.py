@@ -23,7 +23,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from models import random_model
+from whole_models import random_model
 
 NOT_JUDGED = ("tension", "length of paths with contact", "moment arms")
 LOOSER = {"length of paths without contact": 1e-9, "reduced mass matrix, share of its diagonal": 1e-6}

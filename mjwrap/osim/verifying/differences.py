@@ -121,8 +121,8 @@ def verify(
         except StateError as error:
             found.missing.append(f"pose {k}: {error}")
             continue
-        _compare_bodies(every, found, pose, ours, k)
-        _compare_paths(every, found, imported, pose, ours, k, geodesic)
+        elsewhere = _compare_bodies(every, found, pose, ours, k)
+        _compare_paths(every, found, imported, pose, ours, k, geodesic, elsewhere)
         if progress is not None:
             progress(k + 1, len(reference.poses))
     for name, motion in (("passive motion", reference.passive), ("driven motion", reference.driven)):
@@ -156,21 +156,24 @@ def _not_compared(reference: Reference, imported: ImportedModel) -> list[str]:
 
 def _compare_bodies(
     every: dict[str, Quantity], found: Verification, pose: PoseNumbers, ours: ImportedNumbers, k: int
-) -> None:
-    apart = 0.0
+) -> str:
+    """Compare coordinates, bodies and mass; return why paths differ, too, if bodies do, else ""."""
+    apart, moved = 0.0, 0.0
     for name, value in pose.coordinates.items():
         if name in ours.coordinates:
             gap = ours.coordinates[name] - value
             apart = max(apart, abs(gap))
             every["coordinate"].add(gap, f"{name}, pose {k}")
-    why = f"{UNEXPLAINED}: the same coordinates"
+    elsewhere = ""
     if apart > LARGE:
-        why = f"{UNEXPLAINED}: coordinates differ by up to {apart:.2g} rad or m"
+        elsewhere = f"{UNEXPLAINED}: coordinates differ by up to {apart:.2g} rad or m"
+    why = elsewhere or f"{UNEXPLAINED}: the same coordinates"
     for name, place in pose.bodies.items():
         if name not in ours.bodies:
             continue
         theirs, mine = np.array(place), ours.bodies[name]
         shift = float(np.abs(mine[:3] - theirs[:3]).max())
+        moved = max(moved, shift)
         every["position"].add(shift, f"{name}, pose {k}")
         turn = mine[3:].reshape(3, 3) @ theirs[3:].reshape(3, 3).T
         skew = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
@@ -188,6 +191,9 @@ def _compare_bodies(
         every["mass"].add(share, f"pose {k}")
         if not share <= RELATIVE:
             found.differences.append(Difference("mass", "reduced mass matrix", k, 0.0, share, "", why))
+    if moved > LARGE and not elsewhere:
+        return f"{UNEXPLAINED}: bodies are up to {1e3 * moved:.2g} mm apart"
+    return elsewhere
 
 
 def _compare_paths(
@@ -198,6 +204,7 @@ def _compare_paths(
     ours: ImportedNumbers,
     k: int,
     geodesic: Geodesic | None,
+    elsewhere: str,
 ) -> None:
     for name, theirs in pose.lengths.items():
         mine = ours.lengths.get(name)
@@ -207,7 +214,7 @@ def _compare_paths(
         every["wrapped" if touches else "straight"].add(mine - theirs, f"{name}, pose {k}")
         reason = ""
         if not abs(mine - theirs) <= LARGE:
-            reason = length_reason(name, pose, ours, mine - theirs, geodesic)
+            reason = elsewhere or length_reason(name, pose, ours, mine - theirs, geodesic)
             found.differences.append(Difference("length", name, k, theirs, mine, "m", reason))
         for coordinate, arm in pose.moment_arms.get(name, {}).items():
             if coordinate not in ours.moment_arms[name]:
@@ -215,7 +222,7 @@ def _compare_paths(
             own = ours.moment_arms[name][coordinate]
             every["wrapped arm" if touches else "arm"].add(own - arm, f"{name} about {coordinate}, pose {k}")
             if not abs(own - arm) <= LARGE:
-                why = arm_reason(name, coordinate, arm, own, pose)
+                why = elsewhere or arm_reason(name, coordinate, arm, own, pose)
                 reason = reason or length_reason(name, pose, ours, mine - theirs, geodesic)
                 about = f"{name} about {coordinate}"
                 found.differences.append(Difference("moment arm", about, k, arm, own, "m", why or reason))

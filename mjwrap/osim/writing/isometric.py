@@ -56,7 +56,8 @@ def tension(muscle: Muscle, length: float, activation: float) -> float | None:
 
 def largest_difference(muscle: Muscle, law: WrittenLaw, lengths: Iterable[float]) -> float | None:
     """Return the largest difference of tension at rest [shares of max_isometric_force] from the file's; or None."""
-    written = LAWS[law.name](**law_arguments(law.numbers), tendon=law.words["tendon_model"])
+    words = {"tendon": law.words["tendon_model"]}
+    written = LAWS[law.name](**law_arguments(law.numbers), **words)
     strongest = muscle.parameters["max_isometric_force"]
     worst = 0.0
     for length in lengths:
