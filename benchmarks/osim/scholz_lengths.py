@@ -12,6 +12,7 @@ that it does not run through them. Printed: pairs of path and pose, the share wi
 from __future__ import annotations
 
 import argparse
+import contextlib
 import tempfile
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from mjwrap.osim.verifying.scholz import scholz_length
 from mjwrap.osim.verifying.stops import TouchingRoutes
 
 CLOSE = 1e-9  # [m]
+SHARES = 1.0, 0.5, 0.25, 0.1, 0.0  # of the way to a random pose that the constraints of a model may not allow
 
 
 def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int, list[str]]:
@@ -33,13 +35,15 @@ def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int
         mw.import_osim(path, meshes=geometry).save(written)
         model = mujoco.MjModel.from_xml_path(str(written))
     data, muscles = mujoco.MjData(model), mw.MuscleSystem(model)
+    if not muscles.n:
+        return 0, []
     names = muscles.coordinates
     rng = np.random.default_rng(seed)
     count, lines = 0, []
     paths = TouchingRoutes(muscles)
     for k in range(poses):
         mujoco.mj_resetData(model, data)
-        mw.osim.set_coordinates(model, data, {name: draw(model, name, rng) for name in names})
+        place(model, data, {name: draw(model, name, rng) for name in names})
         mujoco.mj_forward(model, data)
         muscles.reset(data)
         muscles.forward(data)
@@ -58,6 +62,16 @@ def compare(path: Path, poses: int, seed: int, geometry: list[str]) -> tuple[int
                     f"  {name}, pose {k}: {length:.9f} m, OpenSim {theirs:.9f} m ({length - theirs:+.2e})"
                 )
     return count, lines
+
+
+def place(model: mujoco.MjModel, data: mujoco.MjData, values: dict[str, float]) -> None:
+    """Set coordinates, or such nearer to the default pose as satisfy the model's constraints."""
+    default = mw.osim.coordinates(model, data)
+    for share in SHARES:
+        nearer = {name: default[name] + share * (value - default[name]) for name, value in values.items()}
+        with contextlib.suppress(mw.StateError):
+            mw.osim.set_coordinates(model, data, nearer)
+            return
 
 
 def draw(model: mujoco.MjModel, name: str, rng: np.random.Generator) -> float:
