@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from mjwrap.checking.outcome import Check
+from mjwrap.mjcf import name_of
 from mjwrap.paths import Status
 from mjwrap.poses.continuation import PathFollower
 from mjwrap.poses.continuity import NARROW
@@ -90,4 +91,14 @@ class Sweeper:
             self._jumps.worst += 1.0
             self._jumps.remarks.append(
                 f"{muscles.names[i]} at {name} = {at:.6f}: {what}; touched surfaces {before}, then {after}"
+                + self._sides(i)
             )
+
+    def _sides(self, i: int) -> str:
+        """Return which geoms a muscle passes on the same side at every pose, at the edge of which its path jumps."""
+        nodes = [node for route in self._muscles.declarations[i].routes for node in route.nodes if node.side]
+        geoms = {name_of(self._muscles.model, mujoco.mjtObj.mjOBJ_GEOM, node.geom): None for node in nodes}
+        if not geoms:
+            return ""
+        listed = " and ".join(f"'{geom}'" for geom in geoms)
+        return f"; the model holds the side of {listed} at every pose, and a path jumps at the edge of such a side"
