@@ -41,6 +41,7 @@ from .inverse import ExternalLoads as ExternalLoads
 from .inverse import Motion as Motion
 from .inverse import MuscleAnalysis as MuscleAnalysis
 from .inverse import inverse_dynamics as inverse_dynamics
+from .inverse import joint_reactions as joint_reactions
 from .inverse import muscle_analysis as muscle_analysis
 from .mjcf import insert_xml as insert_xml
 from .mjcf import muscle_xml as muscle_xml

@@ -1,8 +1,9 @@
-"""From a motion to muscle forces: muscle analysis and inverse dynamics."""
+"""From a motion to muscle forces: muscle analysis, inverse dynamics and joint reactions."""
 
 from mjwrap.inverse.external_force import ExternalForce
 from mjwrap.inverse.external_loads import ExternalLoads
 from mjwrap.inverse.inverse_dynamics import inverse_dynamics
+from mjwrap.inverse.joint_reactions import joint_reactions
 from mjwrap.inverse.motion import Motion
 from mjwrap.inverse.muscle_analysis import MuscleAnalysis, muscle_analysis
 
@@ -12,5 +13,6 @@ __all__ = [
     "Motion",
     "MuscleAnalysis",
     "inverse_dynamics",
+    "joint_reactions",
     "muscle_analysis",
 ]
