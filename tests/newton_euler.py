@@ -38,7 +38,11 @@ def moved_bodies(model: mujoco.MjModel, qpos: Array, qvel: Array, qacc: Array) -
         parent = found[model.body_parentid[b]]
         home = parent.at(model.body_pos[b])
         body = Body(
-            parent.turn @ matrix(model.body_quat[b]), home, parent.spin, parent.spin_rate, parent.acceleration(home)
+            parent.turn @ matrix(model.body_quat[b]),
+            home,
+            parent.spin,
+            parent.spin_rate,
+            parent.acceleration(home),
         )
         for j in range(model.body_jntadr[b], model.body_jntadr[b] + model.body_jntnum[b]):
             body = _moved(model, j, body, qpos, qvel, qacc)
@@ -50,7 +54,9 @@ def _moved(model: mujoco.MjModel, j: int, body: Body, qpos: Array, qvel: Array, 
     kind, q, v = int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
     if kind == FREE:
         turn = matrix(qpos[q + 3 : q + 7])
-        return Body(turn, qpos[q : q + 3], turn @ qvel[v + 3 : v + 6], turn @ qacc[v + 3 : v + 6], qacc[v : v + 3])
+        return Body(
+            turn, qpos[q : q + 3], turn @ qvel[v + 3 : v + 6], turn @ qacc[v + 3 : v + 6], qacc[v : v + 3]
+        )
     axis = body.turn @ model.jnt_axis[j]
     if kind == SLIDE:
         place = body.origin + axis * (qpos[q] - model.qpos0[q])
@@ -58,7 +64,11 @@ def _moved(model: mujoco.MjModel, j: int, body: Body, qpos: Array, qvel: Array, 
         return Body(body.turn, place, body.spin, body.spin_rate, rate)
     anchor = body.at(model.jnt_pos[j])
     if kind == HINGE:
-        turn, spin, spin_rate = body.turn @ about(model.jnt_axis[j], qpos[q] - model.qpos0[q]), axis * qvel[v], axis * qacc[v]
+        turn, spin, spin_rate = (
+            body.turn @ about(model.jnt_axis[j], qpos[q] - model.qpos0[q]),
+            axis * qvel[v],
+            axis * qacc[v],
+        )
     else:
         turn = body.turn @ matrix(qpos[q : q + 4])
         spin, spin_rate = turn @ qvel[v : v + 3], turn @ qacc[v : v + 3]

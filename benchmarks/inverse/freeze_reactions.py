@@ -76,7 +76,9 @@ def one(
         for on in (joint.calcReactionOnChildExpressedInGround, joint.calcReactionOnParentExpressedInGround):
             loads = on(state)
             row.append([loads.get(k).get(i) for k in (1, 0) for i in range(3)])
-        place = [frame.getPositionInGround(state) for frame in (joint.getChildFrame(), joint.getParentFrame())]
+        place = [
+            frame.getPositionInGround(state) for frame in (joint.getChildFrame(), joint.getParentFrame())
+        ]
         row += [[point.get(i) for i in range(3)] for point in place]
         reactions[joint.getName()] = row
     return {

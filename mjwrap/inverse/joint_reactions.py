@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjwrap import validation
 from mjwrap.errors import ModelError, StateError
 from mjwrap.files import Table
+from mjwrap.inverse.coordinates import quaternions
 from mjwrap.inverse.external_loads import GROUND, ExternalLoads, LoadFrames
 from mjwrap.inverse.motion import CompleteMotion, Motion
 from mjwrap.inverse.muscle_wrenches import muscle_wrenches
@@ -41,7 +42,7 @@ _SPRINGS = (
 
 @dataclass(frozen=True)
 class _Joint:
-    """All joints of a body; centre: (3,) in the body, and where that is in the parent at qpos0."""
+    """All joints of a body; centre: (3,) in the body, and where that is in the parent with all joints at zero."""
 
     body: int
     parent: int
@@ -76,7 +77,8 @@ def joint_reactions(
     Returns:
         A table with nine columns for each body: "knee_on_tibia_in_ground_fx", ..., force [N], moment [N m] about the
         joint's centre, "..._px" the centre [m] in the frame. The centre is that of the first hinge or ball, else of
-        the first joint, else the body's origin; on the parent it is where that point is in the parent at qpos0.
+        the first joint, else the body's origin; on the parent it is where that point is in the parent with the joints
+        at zero.
 
     Raises:
         StateError: motion, tensions or loads do not fit, or side or frame are unknown.
@@ -117,7 +119,12 @@ def joint_reactions(
 
 
 def _newton_euler(
-    model: mujoco.MjModel, data: mujoco.MjData, motion: CompleteMotion, k: int, muscles: Array, frames: LoadFrames
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    motion: CompleteMotion,
+    k: int,
+    muscles: Array,
+    frames: LoadFrames,
 ) -> None:
     """Write cfrc_int of frame k: the wrench on each body from its parent, about the centre of mass of its tree."""
     data.qpos[:], data.qvel[:], data.qacc[:] = motion.qpos[k], motion.qvel[k], motion.qacc[k]
@@ -131,7 +138,13 @@ def _newton_euler(
 
 
 def _write(
-    model: mujoco.MjModel, data: mujoco.MjData, joint: _Joint, on_child: bool, axes: int, ground: bool, out: Array
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    joint: _Joint,
+    on_child: bool,
+    axes: int,
+    ground: bool,
+    out: Array,
 ) -> None:
     """Write force, moment about the joint's centre, and the centre, in the axes of a body, to out (9,)."""
     wrench, b = data.cfrc_int[joint.body], joint.body if on_child else joint.parent
@@ -146,19 +159,23 @@ def _write(
 
 def _joints(model: mujoco.MjModel) -> list[_Joint]:
     """Return the joints of all bodies, in the order of the bodies."""
-    found, turn = [], np.zeros(9)
+    zero = mujoco.MjData(model)
+    zero.qpos[:] = 0.0
+    for _, place, _ in quaternions(model):
+        zero.qpos[place] = 1.0
+    mujoco.mj_kinematics(model, zero)
+    found = []
     for body in range(1, model.nbody):
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-        of_body = range(first, first + count)
-        turning = [j for j in of_body if int(model.jnt_type[j]) in _TURNING]
-        chosen = (turning or list(of_body))[:1]
-        centre = np.zeros(3) if not chosen or model.jnt_type[chosen[0]] == _FREE else model.jnt_pos[chosen[0]].copy()
-        mujoco.mju_quat2Mat(turn, model.body_quat[body])
+        kinds = {j: int(model.jnt_type[j]) for j in range(first, first + count)}
+        turning = [j for j, kind in kinds.items() if kind in _TURNING]
+        centre = np.zeros(3)
+        if kinds and kinds[first] != _FREE:
+            centre = model.jnt_pos[(turning or [first])[0]].copy()
         parent = int(model.body_parentid[body])
+        away = zero.xpos[body] + zero.xmat[body].reshape(3, 3) @ centre - zero.xpos[parent]
         name = name_of(model, _JOINT, first) if count else _called(model, body)
-        found.append(
-            _Joint(body, parent, name, centre, model.body_pos[body] + turn.reshape(3, 3) @ centre)
-        )
+        found.append(_Joint(body, parent, name, centre, zero.xmat[parent].reshape(3, 3).T @ away))
     return found
 
 
@@ -200,7 +217,9 @@ def _refuse(model: mujoco.MjModel) -> None:
             "the engine plugin drives the muscles of this model; take mjwrap.plugin.without_plugin(model)"
         )
     causes = {
-        "springs, dampers or armature of tendons": any(np.any(getattr(model, each, 0.0)) for each in _SPRINGS),
+        "springs, dampers or armature of tendons": any(
+            np.any(getattr(model, each, 0.0)) for each in _SPRINGS
+        ),
         "fluid forces (option density, viscosity)": bool(model.opt.density or model.opt.viscosity),
         "flexes": bool(model.nflex),
         "plugins": bool(model.nplugin),

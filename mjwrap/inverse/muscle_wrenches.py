@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,10 +43,11 @@ def muscle_wrenches(muscles: MuscleSystem, motion: CompleteMotion, tension: Arra
                 *points[:5], points.force, motion.qpos[block], some("xpos"), some("xmat"), model.site_pos,
                 some("site_xpos"), slopes, active,
             )  # fmt: skip
-        wrench_frames(
+        given: tuple[Any, ...] = (
             *plan.route_group(), *(some(name) for name in names), muscles._root,
             active, TOLERANCE, *last.paths, tension[block], wrench[block], status[block],
         )  # fmt: skip
+        wrench_frames(*given)
     bad = np.argwhere((status != 0) & (tension != 0.0))
     if len(bad):
         t, m = bad[0]
