@@ -43,6 +43,7 @@ from .inverse import Motion as Motion
 from .inverse import MuscleAnalysis as MuscleAnalysis
 from .inverse import StaticOptimization as StaticOptimization
 from .inverse import inverse_dynamics as inverse_dynamics
+from .inverse import joint_reactions as joint_reactions
 from .inverse import muscle_analysis as muscle_analysis
 from .inverse import static_optimization as static_optimization
 from .mjcf import insert_xml as insert_xml

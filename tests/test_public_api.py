@@ -28,6 +28,7 @@ SIGNATURES = {
     "Motion.from_table": "model, table",
     "muscle_analysis": "muscles, motion",
     "inverse_dynamics": "model, motion, loads=",
+    "joint_reactions": "muscles, motion, tension, *, on=, frame=, loads=",
     "PathSolution.points": "self, spacing",
     "PathSolution.speed": "self, origin_velocity, insertion_velocity, twists",
     "PathSolution.wrenches": "self, tension",

@@ -130,6 +130,7 @@ def calls(given: dict[str, Any], folder: Path) -> dict[str, Callable[[], Call]]:
         "import_osim": ("mjwrap:leg",),
         "insert_xml": ("<mujoco></mujoco>", "<custom/>"),
         "inverse_dynamics": (model, motion),
+        "joint_reactions": (muscles, motion, np.zeros((len(motion.time), muscles.n))),
         "length_ranges": (muscles,),
         "load": (ELBOW,),
         "mesh_points": (mesh, "g"),

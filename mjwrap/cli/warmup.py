@@ -26,6 +26,7 @@ from mjwrap.cli.common.arguments import MODEL_HELP, add_json
 from mjwrap.cli.common.meanwhile import OtherProcess, can_help, laws
 from mjwrap.cli.common.output import Report
 from mjwrap.errors import RecordingError, VersionError
+from mjwrap.inverse.muscle_wrenches import muscle_wrenches
 from mjwrap.kernels.compilation import cache_folders, self_test
 from mjwrap.kernels.compilation.cache_folders import config
 from mjwrap.kernels.musculotendon.dispatch import PARAMS
@@ -191,7 +192,9 @@ def evaluate(model: mujoco.MjModel) -> None:
     system.contacts()
     _ = system.hints_met
     system.energetics(mw.Umberger2010())
-    mw.muscle_analysis(system, mw.Motion([0.0], [model.qpos0]))
+    motion = mw.Motion([0.0], [model.qpos0])
+    mw.muscle_analysis(system, motion)
+    muscle_wrenches(system, motion.completed(model), np.zeros((1, system.n)))
     if not system.status.any():
         system.length_jacobian_rate(data)
 

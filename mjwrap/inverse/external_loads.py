@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import overload
 
 import mujoco
@@ -95,12 +95,23 @@ class LoadFrames:
 
     def add(self, data: mujoco.MjData, k: int, qfrc: Array) -> None:
         """Add Jᵀ of the forces of frame k to qfrc (nv,); data has the kinematics and cdof of this frame."""
+        for body, force, torque, at in self._in_world(data, k):
+            mujoco.mj_applyFT(self._model, data, force, torque, at, body, qfrc)
+
+    def add_to_bodies(self, data: mujoco.MjData, k: int, xfrc: Array) -> None:
+        """Add the forces of frame k to xfrc (nbody, 6), as of `xfrc_applied`; data has the kinematics of this frame."""
+        for body, force, torque, at in self._in_world(data, k):
+            xfrc[body, :3] += force
+            xfrc[body, 3:] += torque + np.cross(at - data.xipos[body], force)
+
+    def _in_world(self, data: mujoco.MjData, k: int) -> Iterator[tuple[int, Array, Array, Array]]:
+        """Yield the body, force, torque and point of application of each load, in the world."""
         for body, axes, frame, force, point, torque in self._parts:
             turn = data.xmat[axes].reshape(3, 3)
             at = data.xpos[body]
             if point is not None:
                 at = data.xpos[frame] + data.xmat[frame].reshape(3, 3) @ point[k]
-            mujoco.mj_applyFT(self._model, data, turn @ force[k], turn @ torque[k], at, body, qfrc)
+            yield body, turn @ force[k], turn @ torque[k], at
 
 
 def _body(model: mujoco.MjModel, load: ExternalForce, name: str) -> int:
