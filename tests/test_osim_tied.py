@@ -82,12 +82,7 @@ def test_imported_models_have_opensims_poses_masses_and_moment_arms(name: str) -
     """Of unwrapped paths, about OpenSim's speeds; masses with the file's inertias, which MuJoCo's compiler refuses."""
     found = imported(name)
     model = mujoco.MjModel.from_xml_string(found.xml, found.assets)
-    for i in range(model.nnumeric):
-        label = model.numeric(i).name
-        if label.startswith("mjwrap_inertia_"):
-            moments = model.numeric_data[model.numeric_adr[i] :][:3]
-            model.body_inertia[model.body(label.removeprefix("mjwrap_inertia_")).id] = moments
-    mujoco.mj_setConst(model, mujoco.MjData(model))
+    mw.osim.restore_inertias(model)
     reference = read_reference(FROZEN / f"verify_{name}.json")
     compared, arms = ImportedModel(model), []
     for pose in reference.poses:

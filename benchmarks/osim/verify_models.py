@@ -57,6 +57,7 @@ def row(path: Path, poses: int, geodesics: int, cache: Path | None) -> dict[str,
     with tempfile.TemporaryDirectory() as folder:
         imported.save(Path(folder) / "model.xml")
         model = mujoco.MjModel.from_xml_path(str(Path(folder) / "model.xml"))
+        mw.osim.restore_inertias(model)
     found = verify(model, reference, geodesic=opensim_geodesic())
     for head, begin in COLUMNS.items():
         largest = [q.largest for q in found.quantities if q.what.startswith(begin)]
