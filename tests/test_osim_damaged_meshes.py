@@ -86,7 +86,7 @@ def mutant(content: bytes, rng: np.random.Generator) -> bytes:
             damaged[place] = rng.integers(0, 256)
         return bytes(damaged)
     if kind == 2:
-        return rng.bytes(rng.integers(0, 3000))
+        return rng.bytes(int(rng.integers(0, 3000)))
     if kind == 3:
         return content[:at] + content[at + int(rng.integers(1, 50)) :]
     spots = list(re.finditer(rb"(?<=[ >])-?\d[\d.e-]*(?=[ <\n/])", content))

@@ -156,7 +156,7 @@ def test_what_is_not_read_is_in_the_report(imported):
 )
 def test_refusals_name_the_element(imported, change, told):
     with pytest.raises(mw.OsimError, match=told):
-        imported(model().replace(*change, 1))
+        imported(model().replace(change[0], change[1], 1))
 
 
 def test_packed_and_empty_files_and_folders_that_are_none(tmp_path):
