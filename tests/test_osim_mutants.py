@@ -13,12 +13,12 @@ import mjwrap as mw
 from mjwrap.mjcf.named_models import osim_file
 
 LEG = "mjwrap:leg"
-COUNTS = {  # mutants of each file: 270 of our own, 60 of public ones
-    LEG: 90,
-    "own_version_3.osim": 60,
-    "own_version_4.osim": 60,
-    "own_joints.osim": 40,
-    "joint_kinds.osim": 20,
+COUNTS = {  # mutants of each file: 300 of our own, 60 of public ones
+    LEG: 143,
+    "own_version_3.osim": 12,
+    "own_version_4.osim": 110,
+    "own_joints.osim": 20,
+    "joint_kinds.osim": 15,
     "BushingForceModel_30000.osim": 20,
     "Tug_of_War_Millard.osim": 20,
     "knee_patella_ligament.osim": 20,

@@ -8,9 +8,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from mjwrap.errors import MjwrapError
-from mjwrap.mjcf.parameters import law_arguments
+from mjwrap.mjcf.parameters import FIBER_LAWS, law_arguments
 from mjwrap.muscles.bench import simulate_muscle
-from mjwrap.muscles.laws import LAWS
 from mjwrap.osim.description.forces import Muscle
 from mjwrap.osim.writing.laws import WrittenLaw
 
@@ -56,8 +55,7 @@ def tension(muscle: Muscle, length: float, activation: float) -> float | None:
 
 def largest_difference(muscle: Muscle, law: WrittenLaw, lengths: Iterable[float]) -> float | None:
     """Return the largest difference of tension at rest [shares of max_isometric_force] from the file's; or None."""
-    words = {"tendon": law.words["tendon_model"]}
-    written = LAWS[law.name](**law_arguments(law.numbers), **words)
+    written = FIBER_LAWS[law.name](**law_arguments(law.numbers), tendon=law.words["tendon_model"])
     strongest = muscle.parameters["max_isometric_force"]
     worst = 0.0
     for length in lengths:
