@@ -268,3 +268,29 @@ def test_forces_that_are_switched_off_are_left_out(tmp_path: Path) -> None:
         (tmp_path / "l.xml").write_text(XML.format(GOOD + more, ""))
         loads = mw.ExternalLoads.from_osim(tmp_path / "l.xml", table)
         assert [force.body for force in loads] == ["foot"] * count
+
+
+LOOP = """<mujoco><worldbody><site name="o" pos="-.1 0 0"/>
+<body name="a"><joint name="hip" axis="0 1 0"/><geom size=".02" mass="1"/>
+<body name="b" pos="0 0 -.3"><joint name="knee" axis="0 1 0"/><geom size=".02" mass="1"/><site name="i"/></body></body>
+<body name="c" pos=".3 0 0"><joint name="crank" axis="0 1 0"/><geom size=".02" mass="1"/></body></worldbody>
+<tendon><spatial name="m"><site site="o"/><site site="i"/></spatial></tendon>
+<actuator><muscle name="m" tendon="m" lengthrange=".1 1"/></actuator>
+<equality><connect name="rod" body1="b" body2="c" anchor=".3 0 0"/></equality></mujoco>"""
+
+
+def test_loops_are_refused_unless_they_are_open() -> None:
+    """Their constraint force is unknown, and a motion that breaks the loop would have got an answer."""
+    model = mujoco.MjModel.from_xml_string(LOOP)
+    motion = mw.Motion(np.linspace(0.0, 1.0, 11), np.zeros((11, 3)))
+    muscles = mw.MuscleSystem(model)
+    for run in (
+        lambda: mw.inverse_dynamics(model, motion),
+        lambda: mw.static_optimization(muscles, motion),
+        lambda: mw.muscle_analysis(muscles, motion),
+        lambda: mw.joint_reactions(muscles, motion, np.zeros((11, 1))),
+    ):
+        with pytest.raises(mw.ModelError, match="equality 'rod' closes a loop"):
+            run()
+    model.eq_active0[:] = 0
+    assert mw.inverse_dynamics(model, motion).values.shape == (11, 3)

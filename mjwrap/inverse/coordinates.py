@@ -13,6 +13,7 @@ from mjwrap.mjcf.couplings import CoupledJoints
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+_LOOPS = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 _FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -58,6 +59,14 @@ class IndependentCoordinates:
         ]
         starts = np.cumsum([0, *(len(each) for each in heads)]).astype(np.int64)
         return others, starts, np.array([head for each in heads for head in each], dtype=np.int64)
+
+
+def refuse_loops(model: mujoco.MjModel, why: str) -> None:
+    """Raise `ModelError`, which names the equality and says why, if an active connect or weld closes a loop."""
+    for e in range(model.neq):
+        if model.eq_active0[e] and int(model.eq_type[e]) in _LOOPS:
+            name = name_of(model, mujoco.mjtObj.mjOBJ_EQUALITY, e)
+            raise ModelError(f"equality '{name}' closes a loop; {why}")
 
 
 def _translates(model: mujoco.MjModel, dof: int) -> bool:

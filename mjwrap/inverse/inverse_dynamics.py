@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mjwrap import validation
 from mjwrap.errors import ModelError, StateError
 from mjwrap.files import Table
-from mjwrap.inverse.coordinates import IndependentCoordinates
+from mjwrap.inverse.coordinates import IndependentCoordinates, refuse_loops
 from mjwrap.inverse.external_loads import ExternalLoads, LoadFrames
 from mjwrap.inverse.motion import CompleteMotion, Motion
 from mjwrap.inverse.threads import in_threads
@@ -59,7 +59,8 @@ def inverse_dynamics(model: mujoco.MjModel, motion: Motion, loads: ExternalLoads
 
     Raises:
         StateError: motion and model do not fit, or the loads do not cover the motion.
-        ModelError: a load acts on an unknown body, or the engine plugin drives the model.
+        ModelError: a load acts on an unknown body, a connect or weld closes a loop, or the engine plugin drives the
+            model.
     """
     independent = IndependentCoordinates(model)
     values = generalized_forces(model, motion, loads)
@@ -78,6 +79,7 @@ def generalized_forces(
         raise ModelError(
             "the engine plugin drives the muscles of this model; take mjwrap.plugin.without_plugin(model)"
         )
+    refuse_loops(model, "generalised forces about the coordinates that it ties are not determined")
     whole = motion.completed(model)
     independent = IndependentCoordinates(model)
     forces = joint_forces(model, whole, loads, jobs)

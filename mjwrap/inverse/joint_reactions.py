@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjwrap import validation
 from mjwrap.errors import ModelError, StateError
 from mjwrap.files import Table
-from mjwrap.inverse.coordinates import quaternions
+from mjwrap.inverse.coordinates import quaternions, refuse_loops
 from mjwrap.inverse.external_loads import GROUND, ExternalLoads, LoadFrames
 from mjwrap.inverse.motion import CompleteMotion, Motion
 from mjwrap.inverse.muscle_wrenches import muscle_wrenches
@@ -30,7 +30,6 @@ PARTS = ("fx", "fy", "fz", "mx", "my", "mz", "px", "py", "pz")
 _BODY, _JOINT = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_JOINT
 _TURNING = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL))
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
-_LOOPS = tuple(int(kind) for kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD))
 _SPRINGS = (
     "tendon_stiffness",
     "tendon_stiffnesspoly",
@@ -205,13 +204,10 @@ def _tensions(given: ArrayLike, frames: int, n: int) -> Array:
 
 def _refuse(model: mujoco.MjModel) -> None:
     """Raise `ModelError` where forces on bodies do not follow from motion, tensions and loads."""
-    for e in range(model.neq):
-        if model.eq_active0[e] and int(model.eq_type[e]) in _LOOPS:
-            name = name_of(model, mujoco.mjtObj.mjOBJ_EQUALITY, e)
-            raise ModelError(
-                f"equality '{name}' closes a loop; its force does not follow from motion and tensions, so the "
-                "reactions of the loop's joints are not determined"
-            )
+    refuse_loops(
+        model,
+        "its force does not follow from motion and tensions, so the reactions of the loop's joints are not determined",
+    )
     if has_plugin(model):
         raise ModelError(
             "the engine plugin drives the muscles of this model; take mjwrap.plugin.without_plugin(model)"

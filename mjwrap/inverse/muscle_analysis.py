@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjwrap import validation
 from mjwrap.errors import PathError, StateError
 from mjwrap.files import Table
-from mjwrap.inverse.coordinates import IndependentCoordinates
+from mjwrap.inverse.coordinates import IndependentCoordinates, refuse_loops
 from mjwrap.inverse.kinematics import Kinematics
 from mjwrap.inverse.motion import Motion
 from mjwrap.kernels.coupling import path_points
@@ -96,12 +96,14 @@ def muscle_analysis(
 
     Raises:
         StateError: the motion or the activations do not fit the model.
+        ModelError: a connect or weld closes a loop.
         PathError: a muscle has no path at some frame, and `muscles` is strict.
     """
     validation.of_type(muscles, "MuscleSystem", "muscles", StateError)
     validation.instance(motion, Motion, "motion", StateError, "a mw.Motion")
     jobs = validation.whole(jobs, 1, "jobs", StateError)
     model, plan = muscles.model, muscles._plan
+    refuse_loops(model, "take `MuscleSystem.moment_arms` at each pose, which includes what it ties")
     whole = motion.completed(model)
     independent = IndependentCoordinates(model)
     frames, n, k = len(whole), plan.n, len(independent.dofs)
