@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjwrap.inverse.motion import CompleteMotion
+from mjwrap.kernels.coupling.groups import PathPoints
+from mjwrap.kernels.inverse.muscle_frames import place_points
 
 Array = NDArray[np.float64]
 BLOCK = 256  # frames, few enough to stay in the processor's cache
@@ -50,3 +52,13 @@ class Kinematics:
                 for block, source in kept:
                     block[k] = source
             yield first, end
+
+    def place_points(self, points: PathPoints, qpos: Array, slopes: Array, active: NDArray[np.int64]) -> None:
+        """Place moving and conditional points of the present block, which needs xpos, xmat and site_xpos.
+
+        points: `PathPoints.group()`. qpos: (count, nq). Written are site_xpos, slopes and, (count, routes), active.
+        """
+        place_points(
+            *points[:5], points.force, qpos, self.array("xpos"), self.array("xmat"), self._model.site_pos,
+            self.array("site_xpos"), slopes, active,
+        )  # fmt: skip

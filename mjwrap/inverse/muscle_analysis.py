@@ -18,7 +18,7 @@ from mjwrap.inverse.kinematics import Kinematics
 from mjwrap.inverse.motion import Motion
 from mjwrap.kernels.coupling import path_points
 from mjwrap.kernels.coupling.muscle_paths import R_MUSCLE, R_SURFACES
-from mjwrap.kernels.inverse.muscle_frames import measure_frames, place_points
+from mjwrap.kernels.inverse.muscle_frames import measure_frames
 from mjwrap.paths import Status
 from mjwrap.system import MuscleSystem
 from mjwrap.system.evaluator import TOLERANCE
@@ -129,10 +129,7 @@ def muscle_analysis(
             active = np.ones((end - first, len(plan.routes)), dtype=np.int64)
             if points is not None:
                 slopes = np.zeros((end - first, len(points.axes), path_points.SLOPE))
-                place_points(
-                    *points[:5], points.force, whole.qpos[block], some("xpos"), some("xmat"), model.site_pos,
-                    some("site_xpos"), slopes, active,
-                )  # fmt: skip
+                kinematics.place_points(points, whole.qpos[block], slopes, active)
             shared = (
                 *plan.route_group(), plan.law, plan.params,
                 *(some(name) for name in ("site_xpos", "geom_xpos", "geom_xmat", "cvel", "subtree_com")),

@@ -11,7 +11,6 @@ from mjwrap.errors import PathError
 from mjwrap.inverse.kinematics import Kinematics
 from mjwrap.inverse.motion import CompleteMotion
 from mjwrap.kernels.coupling import path_points
-from mjwrap.kernels.inverse.muscle_frames import place_points
 from mjwrap.kernels.inverse.muscle_wrenches import wrench_frames
 from mjwrap.paths import Status
 from mjwrap.system import MuscleSystem
@@ -39,10 +38,7 @@ def muscle_wrenches(muscles: MuscleSystem, motion: CompleteMotion, tension: Arra
         active = np.ones((end - first, len(plan.routes)), dtype=np.int64)
         if points is not None:
             slopes = np.zeros((end - first, len(points.axes), path_points.SLOPE))
-            place_points(
-                *points[:5], points.force, motion.qpos[block], some("xpos"), some("xmat"), model.site_pos,
-                some("site_xpos"), slopes, active,
-            )  # fmt: skip
+            kinematics.place_points(points, motion.qpos[block], slopes, active)
         given: tuple[Any, ...] = (
             *plan.route_group(), *(some(name) for name in names), muscles._root,
             active, TOLERANCE, *last.paths, tension[block], wrench[block], status[block],
